@@ -51,7 +51,7 @@ _HOME = {
     "synthesize": "raychan.run.stages",
     "range_doppler": "raychan.run.stages",
     "detect": "raychan.run.stages",
-    "range_azimuth": "raychan.run.directions",
+    "range_azimuth": "raychan.run.explanation.directions",
     "RangeAzimuth": "raychan.processing.range_azimuth",
     "doa": "raychan.processing.doa",
     "SceneRoutes": "raychan.run.stages",
@@ -62,7 +62,7 @@ _HOME = {
     "explain": "raychan.run.explain",
     "load_result": "raychan.run.storage",
     "save_result": "raychan.run.storage",
-    "StoreError": "raychan.run.output_files",
+    "StoreError": "raychan.run.files.output",
     "spectrogram": "raychan.run.spectrogram",
     "Spectrogram": "raychan.run.spectrogram",
     "rcs": "raychan.run.rcs",
@@ -98,9 +98,9 @@ if TYPE_CHECKING:
     from raychan.radar.waveform import Waveform as Waveform
     from raychan.records import Paths as Paths
     from raychan.records import SpecularPaths as SpecularPaths
-    from raychan.run.directions import range_azimuth as range_azimuth
     from raychan.run.explain import explain as explain
-    from raychan.run.output_files import StoreError as StoreError
+    from raychan.run.explanation.directions import range_azimuth as range_azimuth
+    from raychan.run.files.output import StoreError as StoreError
     from raychan.run.rcs import rcs as rcs
     from raychan.run.result import Result as Result
     from raychan.run.sequence import frames as frames

@@ -24,7 +24,7 @@ from raychan.cli.spectrogram import spectrogram
 from raychan.cli.study import study
 from raychan.cli.validate import validate
 from raychan.cli.view import view
-from raychan.run.in_place import ENDS, forget, told
+from raychan.run.files.in_place import ENDS, forget, told
 
 _HELP = """Simulate a radar: from a scene to a range-Doppler map whose detections name the bodies they come from.
 

@@ -65,7 +65,7 @@ def explain(
     its own at the start of the frame. Angles are azimuth and elevation in world axes.
     """
     from raychan.run.explain import explain as explain_result
-    from raychan.run.output_files import StoreError
+    from raychan.run.files.output import StoreError
 
     try:
         why = explain_result(directory, range, speed, detection=detection, cell=cell)

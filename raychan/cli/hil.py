@@ -14,7 +14,7 @@ import typer
 from raychan.cli import show
 from raychan.cli.hil_files import check_out, track, write_summary
 from raychan.cli.options import ShipChanges, ShipSceneFile, directory, within
-from raychan.run.in_place import ENDS
+from raychan.run.files.in_place import ENDS
 from raychan.world.limits import Limit
 
 if TYPE_CHECKING:
@@ -158,7 +158,7 @@ def _run(wishes: _Wishes, channels: dict[str, Channel], ending: ExitStack) -> di
     from raychan.hil.lms import STREAM, check_sendable
     from raychan.hil.session import Session
     from raychan.hil.summary import summary
-    from raychan.run.ship_scene import read_ship_scene
+    from raychan.run.ship.scene import read_ship_scene
 
     loaded = read_ship_scene(wishes.scene, wishes.changes)
     show.warn(loaded.warnings + check_sendable(loaded.scanner))

@@ -27,8 +27,8 @@ _BEGINS = {_SUMMARY: b'{"ended":', "track.csv": b"utc,t_s,north_m,"}
 
 def check_out(out: Path, names: tuple[str, ...] = tuple(_BEGINS)) -> None:
     """Raise StoreError where files of others, or of another command, would be replaced."""
-    from raychan.run.contents import Contents
-    from raychan.run.output_files import StoreError
+    from raychan.run.files.contents import Contents
+    from raychan.run.files.output import StoreError
 
     if obstacle := Contents(names, signs=names, begins=_BEGINS).obstacle_of_each(out):
         raise StoreError(obstacle)
@@ -36,7 +36,7 @@ def check_out(out: Path, names: tuple[str, ...] = tuple(_BEGINS)) -> None:
 
 def write_summary(out: Path, numbers: dict[str, Any]) -> None:
     """Write the numbers of a run. Raises: StoreError for errors of the disk, and for a file of another's."""
-    from raychan.run.output_files import write_whole
+    from raychan.run.files.output import write_whole
 
     check_out(out, (_SUMMARY,))
     write_whole(out / _SUMMARY, json.dumps(numbers, indent=2).encode())
@@ -45,7 +45,7 @@ def write_summary(out: Path, numbers: dict[str, Any]) -> None:
 @contextmanager
 def track(out: Path | None) -> Iterator[Callable[[Instruments, Reading], None]]:
     """Yield a function that writes each reading into track.csv, where there is a directory. Raises: StoreError."""
-    from raychan.run.output_files import StoreError
+    from raychan.run.files.output import StoreError
 
     if out is None:
         yield lambda instruments, at: None
@@ -88,7 +88,7 @@ def _try(write: Callable[[], object], lost: list[str]) -> None:
 
 def _row(instruments: Instruments, at: Reading) -> list[str]:
     """Return a reading as a row of track.csv."""
-    from raychan.run.ship_files import rounded_heading
+    from raychan.run.ship.files import rounded_heading
 
     heading, *angles = (math.degrees(a) for a in (at.heading, at.roll, at.pitch, at.rudder))
     where = (at.time, at.north, at.east)

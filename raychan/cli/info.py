@@ -216,7 +216,7 @@ def _targets(scene: Any) -> list[Table]:
 
 def _drawn(scene: Any, plot: Path) -> None:
     from raychan.report.detection_figure import detection_picture
-    from raychan.run.output_files import write_whole
+    from raychan.run.files.output import write_whole
     from raychan.run.target_links import detector_of, target_links
 
     detector = detector_of(scene.radar)

@@ -21,7 +21,7 @@ from raychan.cli.rcs_output import (
     table_of,
     uncertainties,
 )
-from raychan.run.in_place import told
+from raychan.run.files.in_place import told
 from raychan.scalars import as_text
 from raychan.world import limits
 
@@ -163,7 +163,7 @@ def _written(
     """Write the table and the figure that are asked for."""
     import numpy as np
 
-    from raychan.run.output_files import write_together
+    from raychan.run.files.output import write_together
 
     files: dict[Path, bytes | memoryview] = {}
     if out is not None:
@@ -218,7 +218,7 @@ def _kept(out: Path | None, plot: Path | None, az: Any, el: Any, parts: list[Rcs
     that a figure which is there is not of them."""
     if out is None or not parts:
         return ""
-    from raychan.run.output_files import write_whole
+    from raychan.run.files.output import write_whole
 
     found = _joined(parts)
     count = found.sigma.size

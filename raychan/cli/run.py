@@ -86,7 +86,7 @@ def _list() -> None:
 
 
 def _single(scene: Scene, out: Path, options: dict[str, Any], pictures: bool) -> None:
-    from raychan.run.output_files import staging
+    from raychan.run.files.output import staging
     from raychan.run.simulate import simulate
     from raychan.run.storage import CONTENTS, write_result
 
@@ -102,7 +102,7 @@ def _single(scene: Scene, out: Path, options: dict[str, Any], pictures: bool) ->
 
 def _report(result: Result, out: Path, warnings: list[str], pictures: bool) -> None:
     """Print what a run found and which files it wrote."""
-    from raychan.run.messages import notes as result_notes
+    from raychan.run.messages.results import notes as result_notes
     from raychan.run.storage import ARRAY_PICTURES, PICTURES
 
     notes = result_notes(result)
@@ -123,8 +123,8 @@ def _report(result: Result, out: Path, warnings: list[str], pictures: bool) -> N
 def _sequence(
     scene: Scene, out: Path, count: int, interval: float | None, options: dict[str, Any], pictures: bool
 ) -> None:
-    from raychan.run.messages import findings, marks
-    from raychan.run.output_files import PictureError
+    from raychan.run.files.output import PictureError
+    from raychan.run.messages.results import findings, marks
     from raychan.run.sequence import Store, frames, overlap
 
     show.warn(overlap(scene, count, interval))
@@ -167,7 +167,7 @@ def _pictures(  # type: ignore[no-untyped-def]
     from raychan.parallel import run_pair
     from raychan.report.direction_figures import direction_pictures
     from raychan.report.figures import profile_picture, rdmap_picture
-    from raychan.run.output_files import PictureError
+    from raychan.run.files.output import PictureError
     from raychan.view.scene import drawing_of, scene_picture
 
     def drawn() -> list[str] | PictureError:

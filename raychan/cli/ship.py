@@ -14,8 +14,8 @@ from raychan.cli.options import Directory, ShipChanges, within
 from raychan.world import limits
 
 if TYPE_CHECKING:
-    from raychan.run.ship_files import ShipLog
-    from raychan.run.ship_scene import ShipScene
+    from raychan.run.ship.files import ShipLog
+    from raychan.run.ship.scene import ShipScene
 
 
 def ship(
@@ -47,9 +47,9 @@ def ship(
     time, the track with what beams met, heading and roll, and all of it in space. They replace those of an earlier
     run, all at once at the end; other files in DIR stay.
     """
-    from raychan.run.output_files import staging
-    from raychan.run.ship_files import CONTENTS, PICTURES, sail_into
-    from raychan.run.ship_scene import read_ship_scene
+    from raychan.run.files.output import staging
+    from raychan.run.ship.files import CONTENTS, PICTURES, sail_into
+    from raychan.run.ship.scene import read_ship_scene
 
     if out is None:
         raise typer.BadParameter("missing: name a directory for the results", param_hint="--out")
@@ -93,8 +93,8 @@ def _pictures(scene: ShipScene, log: ShipLog, stage: Path, tell: Any) -> list[st
 
 
 def _tell(found: dict[str, Any]) -> None:
-    from raychan.run.ship_files import rounded_heading
-    from raychan.run.ship_places import lost_lines
+    from raychan.run.ship.files import rounded_heading
+    from raychan.run.ship.places import lost_lines
 
     screen = show.console()
     show.warn(lost_lines(found["lost_in"], found["scans"]))

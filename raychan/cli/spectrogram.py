@@ -107,8 +107,8 @@ def _computed(scene: Scene, seconds: float, options: dict[str, Any]) -> Spectrog
 
 def _written(scene: Scene, out: Path, found: Spectrogram) -> list[Path]:
     from raychan.report.spectrogram_figure import spectrogram_picture
-    from raychan.run.output_files import folder_for, write_together
-    from raychan.run.spectrogram_file import as_netcdf
+    from raychan.run.files.output import folder_for, write_together
+    from raychan.run.files.spectrogram import as_netcdf
 
     files: dict[Path, bytes | memoryview] = {
         out / "spectrogram.nc": as_netcdf(found, scene.text),

@@ -58,8 +58,8 @@ def tradeoff(
     Writes tradeoff.csv, tradeoff_CASE.png for each case and tradeoff.png with the Pareto front of the settings.
     """
     from raychan.report.tradeoff_figures import case_picture, summary_picture
-    from raychan.run.contents import Contents
-    from raychan.run.output_files import staging
+    from raychan.run.files.contents import Contents
+    from raychan.run.files.output import staging
     from raychan.study.tradeoff import comparable, read_csv, tradeoff, write_csv
     from raychan.study.verdicts import verdicts
 

@@ -38,8 +38,8 @@ def laser(
     Roll, pitch, yaw, position, and a late record, on the sea and on a quay; and the detection probability of a tower
     against amplitudes of roll and pitch. Writes laser_errors.csv, laser_detection.csv and four figures."""
     from raychan.report.laser_figures import FIGURES, laser_pictures
-    from raychan.run.contents import Contents
-    from raychan.run.output_files import staging
+    from raychan.run.files.contents import Contents
+    from raychan.run.files.output import staging
     from raychan.study import laser_detection, laser_errors
 
     tables = "laser_errors.csv", "laser_detection.csv"

@@ -53,8 +53,8 @@ def sensitivity(
     and the stated error is speckle; it is in error where the stated error exceeds the tolerance and is not below the
     spread; else it is steady, or intermittent where not every draw sees it.
     With --out, writes sensitivity.csv and sensitivity.png, and with --each, each.csv."""
-    from raychan.run.contents import Contents
-    from raychan.run.output_files import staging
+    from raychan.run.files.contents import Contents
+    from raychan.run.files.output import staging
     from raychan.study.sensitivity import Tolerances
     from raychan.study.sensitivity import sensitivity as study
     from raychan.world.errors import SceneError

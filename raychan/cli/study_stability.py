@@ -30,8 +30,8 @@ def stability(
     Writes stability.md, stability.csv and figures. Failures are listed; the exit code is 0 also then.
     """
     from raychan.report.stability_figures import FIGURES, pictures
-    from raychan.run.contents import Contents
-    from raychan.run.output_files import staging
+    from raychan.run.files.contents import Contents
+    from raychan.run.files.output import staging
     from raychan.study.stability import cells, summary, write_csv, write_markdown
     from raychan.study.stability import stability as study
 

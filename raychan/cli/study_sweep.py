@@ -10,8 +10,8 @@ import typer
 
 from raychan.cli import show
 from raychan.cli.options import Changes, MaxBounces, SceneFile, Seed, Threads, Tolerance, directory
-from raychan.run.contents import Contents
-from raychan.run.in_place import told
+from raychan.run.files.contents import Contents
+from raychan.run.files.in_place import told
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -57,7 +57,7 @@ def sweep(
     of the body are relative to the weakest that the radar reports. Writes sweep.csv and sweep.png; after Ctrl-C,
     or where a step is no possible scene, sweep.csv has the steps that are done."""
     from raychan.report.sweep_figures import sweep_picture
-    from raychan.run.output_files import staging
+    from raychan.run.files.output import staging
     from raychan.study import sweep as study
     from raychan.world.errors import SceneError
     from raychan.world.scene import Scene
@@ -96,7 +96,7 @@ def _axes(vary: list[str], times: str | None) -> tuple[Axis, ...]:
 
 def _kept(done: Sweep, out: Path) -> str:
     """Write the table of the steps that are done; return how many these are, '' for none."""
-    from raychan.run.output_files import staging
+    from raychan.run.files.output import staging
     from raychan.study.sweep import write_csv
 
     if not done.steps:

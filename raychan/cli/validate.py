@@ -58,8 +58,8 @@ def validate(
     if a listed one is gone."""
     from raychan.report.validation_page import page
     from raychan.report.validation_report import markdown
-    from raychan.run.contents import Contents
-    from raychan.run.output_files import staging, write_whole
+    from raychan.run.files.contents import Contents
+    from raychan.run.files.output import staging, write_whole
     from raychan.study.validation.sections import ablations, array_gains, budgets, ghosts
     from raychan.study.validation.validate import validate as run
 

@@ -65,7 +65,7 @@ def view(
 
 def _write(drawing: Drawing, screenshot: Path | None, html: Path | None) -> None:
     """Write the picture and the page that are asked for, and print their names."""
-    from raychan.run.output_files import write_together
+    from raychan.run.files.output import write_together
     from raychan.view.scene import drawn_scene
     from raychan.view.web import page
 
@@ -83,7 +83,7 @@ def _write(drawing: Drawing, screenshot: Path | None, html: Path | None) -> None
 def _drawing(source: Path, range: float | None, speed: float | None, detection: int | None) -> Drawing:
     """Return the drawing of a scene file, or of a result and the rays asked for. Raises: typer.BadParameter."""
     from raychan.run.explain import explain
-    from raychan.run.output_files import StoreError
+    from raychan.run.files.output import StoreError
     from raychan.run.storage import load_result
     from raychan.view.scene import drawing_of
     from raychan.world.errors import SceneError, is_guess

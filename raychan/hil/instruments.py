@@ -8,7 +8,7 @@ from datetime import datetime, timedelta
 
 from raychan.hil import nmea
 from raychan.hil.geodesy import Origin
-from raychan.run.ship_loop import Frame, ShipLoop
+from raychan.run.ship.loop import Frame, ShipLoop
 from raychan.sensors.laser import Scanner
 
 

@@ -24,8 +24,8 @@ from raychan.hil.orders import OrderReader
 from raychan.hil.pacing import Schedule, run_first
 from raychan.hil.scans import ScanValues
 from raychan.hil.telegrams import Telegram, TelegramReader
-from raychan.run.ship_loop import Frame
-from raychan.run.ship_places import LostScans
+from raychan.run.ship.loop import Frame
+from raychan.run.ship.places import LostScans
 
 SCANNER, POSITION, HEADING, ATTITUDE = "scanner", "position", "heading", "attitude"
 CHANNELS = (SCANNER, POSITION, HEADING, ATTITUDE)

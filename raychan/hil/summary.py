@@ -7,7 +7,7 @@ from typing import Any
 from raychan.hil.channel import Channel
 from raychan.hil.pacing import Timing
 from raychan.hil.session import SCANNER, Session
-from raychan.run.ship_places import lost_lines
+from raychan.run.ship.places import lost_lines
 
 _KEPT_UP = 10
 """Scans that a loop may owe at the end without a warning; a pause of the machine takes some."""

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.run.output_files import write_picture
+from raychan.run.files.output import write_picture
 
 Floats = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from raychan.processing.range_azimuth import RangeAzimuth, beams_of
 from raychan.report.canvas import PALETTE, figure, outlined, save, style
-from raychan.run.directions import angles_in
+from raychan.run.explanation.directions import angles_in
 from raychan.run.receiver import aperture_of
 from raychan.run.result import Result
 from raychan.study.close_pair import PairSweep

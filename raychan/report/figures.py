@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from raychan.records import RangeDoppler
 from raychan.report.canvas import MARKS, Placer, on, outlined, save, style
-from raychan.run.labels import chains, explain_cell, response_of
+from raychan.run.explanation.labels import chains, explain_cell, response_of
 from raychan.run.result import LINE_OF_SIGHT, Explanation, Result
 from raychan.units import dbm, watt
 

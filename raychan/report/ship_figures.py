@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.report.canvas import PALETTE, Placer, figure, save, style, verbatim
-from raychan.run.ship_files import COLUMNS, ShipLog
-from raychan.run.ship_scene import ShipScene
+from raychan.run.ship.files import COLUMNS, ShipLog
+from raychan.run.ship.scene import ShipScene
 from raychan.sensors.laser import NO_BODY, SEA
 
 Floats = NDArray[np.float64]

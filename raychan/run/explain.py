@@ -15,10 +15,10 @@ from raychan.columns import Record, column
 from raychan.poses import angles
 from raychan.radar.declared import check_type
 from raychan.records import NONE, TRANSMIT, Complexes, Floats, Ints, Paths, RangeDoppler
-from raychan.run.directions import beam_to, wave_in_beam
+from raychan.run.explanation.directions import beam_to, wave_in_beam
+from raychan.run.explanation.labels import Chains, chains, explain_cell, peaks_with_levels, response_of, waves_in
+from raychan.run.explanation.no_echoes import named, no_echoes_of
 from raychan.run.interferers import Sent, interference
-from raychan.run.labels import Chains, chains, explain_cell, peaks_with_levels, response_of, waves_in
-from raychan.run.no_echoes import named, no_echoes_of
 from raychan.run.result import Contribution, Explanation, Result
 from raychan.world.geometry import geometry_of
 from raychan.world.scene import Scene

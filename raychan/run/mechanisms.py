@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from raychan.columns import take
 from raychan.radar.radar import Radar
 from raychan.records import DIFFRACT, TRANSMIT, Paths
-from raychan.run.ledger import NOTHING, ModelChoice
+from raychan.run.ledger_entry import NOTHING, ModelChoice
 from raychan.run.receiver import FAINT, noise_of_beam, quiet_map
 from raychan.signal.baseband import synthesize
 from raychan.units import db, undb

@@ -14,7 +14,7 @@ from raychan.columns import column
 from raychan.radar.waveform import Waveform
 from raychan.records import Cube, Detections, Floats, MapError, Paths, Profile, RangeDoppler
 from raychan.reprs import Described, PlottedTwice
-from raychan.run.ledger import Entry
+from raychan.run.ledger_entry import Entry
 
 if TYPE_CHECKING:
     from raychan.world.scene import Scene

@@ -14,18 +14,18 @@ from raychan.records import Cube, Points
 from raychan.run.clock import Clock
 from raychan.run.fluctuation import check
 from raychan.run.instant import traced_at
-from raychan.run.launch_messages import merged, uncut
-from raychan.run.ledger import ModelChoice
+from raychan.run.ledger_entry import ModelChoice
 from raychan.run.mechanisms import choose
+from raychan.run.messages.launches import merged, uncut
 from raychan.run.micro_doppler import retraced
 from raychan.run.path_stream import MOST, Launched, PathStream
-from raychan.run.preview import preview_notes, preview_of
+from raychan.run.preview.frame import preview_notes, preview_of
+from raychan.run.refinement.scene_refinement import SceneRefinement
+from raychan.run.refinement.unreached import Remains
 from raychan.run.rules import asked, check_demand, check_rule, fine_rule
-from raychan.run.scene_refinement import SceneRefinement
 from raychan.run.segments import Retraced, Traced
 from raychan.run.solver import Batch, solve_into
 from raychan.run.turning import carried_on, needed
-from raychan.run.unreached import Remains
 from raychan.tracing.settings import PruneRule
 from raychan.tracing.stats import Stats
 from raychan.world.geometry import Geometry, geometry_of

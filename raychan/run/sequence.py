@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from raychan.run.clock import Clock, Progress
-from raychan.run.output_files import StoreError, csv_bytes, staging
+from raychan.run.files.output import StoreError, csv_bytes, staging
 from raychan.run.result import Result
 from raychan.run.scene_channel import Channel, channel_of
 from raychan.run.simulate import result_of

@@ -13,16 +13,17 @@ from raychan.parallel import run_pair
 from raychan.radar.radar import Radar
 from raychan.records import MIRROR, Cube, Detections, Facets, MapError, RangeDoppler
 from raychan.run.clock import Clock, Progress
-from raychan.run.directions import beam_to
+from raychan.run.explanation.directions import beam_to
+from raychan.run.explanation.labels import Chains, chains, provenance
+from raychan.run.explanation.no_echoes import NoEcho, all_named, no_echoes_of
+from raychan.run.explanation.rate_spread import claimed, launch_share, motion, without
 from raychan.run.interferers import Sent, interference, never_heard
-from raychan.run.labels import Chains, chains, provenance
-from raychan.run.launch_messages import overrun
-from raychan.run.ledger import Entry
-from raychan.run.messages import counts, told
-from raychan.run.no_echoes import NoEcho, all_named, no_echoes_of
+from raychan.run.ledger.wide_arrays import WIDE, before_wide_arrays
+from raychan.run.ledger_entry import Entry
+from raychan.run.messages.launches import overrun
+from raychan.run.messages.results import counts, told
 from raychan.run.path_stream import Launched
-from raychan.run.preview import preview_error, preview_ledger
-from raychan.run.rate_spread import claimed, launch_share, motion, without
+from raychan.run.preview.frame import preview_error, preview_ledger
 from raychan.run.realization import realized
 from raychan.run.received import notes, received
 from raychan.run.receiver import detections_in, map_error, map_of, noise_of_cell, quiet_map
@@ -30,7 +31,6 @@ from raychan.run.result import ExplainedDetections, Explanation, Receiver, Resul
 from raychan.run.rounding import Rounding, coarse
 from raychan.run.scene_channel import Channel, channel_of
 from raychan.run.unmodelled import ledger
-from raychan.run.wide_arrays import WIDE, before_wide_arrays
 from raychan.scalars import as_text
 from raychan.signal.baseband import synthesize
 from raychan.signal.delay_profile import profile_of

@@ -14,8 +14,8 @@ from raychan.radar.declared import check_type
 from raychan.radar.radar import Radar
 from raychan.records import Cube, Detections, Facets, Paths, RangeDoppler
 from raychan.run.instant import traced_at
-from raychan.run.preview import preview_noise, preview_rule
-from raychan.run.preview_launch import preview_routes
+from raychan.run.preview.frame import preview_noise, preview_rule
+from raychan.run.preview.launch import preview_routes
 from raychan.run.received import received
 from raychan.run.receiver import (
     check_cube,
@@ -25,8 +25,8 @@ from raychan.run.receiver import (
     noise_amplitude,
     noise_equivalent_amplitude,
 )
+from raychan.run.refinement.scene_refinement import SceneRefinement
 from raychan.run.rules import asked, check_rule, fine_rule, rule_of
-from raychan.run.scene_refinement import SceneRefinement
 from raychan.run.solver import Batch
 from raychan.run.turning import needed
 from raychan.signal.baseband import synthesize as samples_of

@@ -15,10 +15,10 @@ import numpy as np
 
 from raychan.radar.declared import check_type
 from raychan.radar.waveform import Waveform
-from raychan.run.contents import Contents
-from raychan.run.ledger import entry_of
-from raychan.run.netcdf import GROUPS, as_netcdf, read_record
-from raychan.run.output_files import StoreError, csv_bytes, staging
+from raychan.run.files.contents import Contents
+from raychan.run.files.netcdf import GROUPS, as_netcdf, read_record
+from raychan.run.files.output import StoreError, csv_bytes, staging
+from raychan.run.ledger_entry import entry_of
 from raychan.run.receiver import aperture_of
 from raychan.run.result import LABELS, Contribution, Explanation, Receiver, Result
 from raychan.scalars import shown

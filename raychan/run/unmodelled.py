@@ -14,15 +14,15 @@ from raychan.parallel import parallel_map
 from raychan.radar.radar import Radar
 from raychan.records import Facets, Paths, Points
 from raychan.run.clutter import laws_of, scatters_diffusely, share_of_distance
-from raychan.run.coming_back import coming_back
-from raychan.run.going_on import going_on, shorter
-from raychan.run.intra_frame import intra_frame
-from raychan.run.labels import alike
-from raychan.run.ledger import NOTHING, SEEN, UNKNOWN, Entry
+from raychan.run.explanation.labels import alike
+from raychan.run.ledger.coming_back import coming_back
+from raychan.run.ledger.going_on import going_on, shorter
+from raychan.run.ledger.intra_frame import intra_frame
+from raychan.run.ledger.tessellation import coarsest, strongest_bend
+from raychan.run.ledger.waves import creeping_waves, over_band
+from raychan.run.ledger_entry import NOTHING, SEEN, UNKNOWN, Entry
 from raychan.run.mechanisms import interactions, layers, layers_at_once, least_detection, peak
 from raychan.run.solver import paths_over_wedges
-from raychan.run.tessellation import coarsest, strongest_bend
-from raychan.run.unmodelled_waves import creeping_waves, over_band
 from raychan.tracing.diffuse_patches import PatchSize, visible_patches
 from raychan.tracing.legs import mirrors_left_out
 from raychan.units import C0, db

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from raychan.run.labels import whole
+from raychan.run.explanation.labels import whole
 from raychan.run.result import Result
 from raychan.units import dbm
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.run.output_files import csv_bytes, write_whole
+from raychan.run.files.output import csv_bytes, write_whole
 from raychan.study.laser_deck import Deck, ranges, standing
 from raychan.world.body import Body
 

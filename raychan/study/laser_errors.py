@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.dynamics.ship import KNOT
-from raychan.run.output_files import csv_bytes, write_whole
+from raychan.run.files.output import csv_bytes, write_whole
 from raychan.sensors.laser import SEA
 from raychan.study.laser_deck import POSE, Deck, ranges, slopes, standing, stratified
 from raychan.world.body import Body

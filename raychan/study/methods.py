@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.poses import direction
+from raychan.run.cross_section.refinement import refinements
+from raychan.run.cross_section.scattering import scattering
+from raychan.run.cross_section.single_body import facets_of
 from raychan.run.rcs import rcs
-from raychan.run.rcs_refinement import refinements
-from raychan.run.scattering import scattering
-from raychan.run.single_body import facets_of
 from raychan.study.cases import FREQUENCY, WAVENUMBER, Target, vertical
 from raychan.study.ray_lattice import Window, echoes
 from raychan.study.specular_points import specular_points

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from raychan.poses import direction
 from raychan.records import Facets
-from raychan.run.rcs_refinement import refinements
-from raychan.run.scattering import scattering
-from raychan.run.single_body import facets_of
+from raychan.run.cross_section.refinement import refinements
+from raychan.run.cross_section.scattering import scattering
+from raychan.run.cross_section.single_body import facets_of
 from raychan.tracing.legs import Leg
 from raychan.units import C0
 from raychan.world.geometry import Geometry

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.run.clock import STAGES
-from raychan.run.output_files import csv_bytes, write_whole
+from raychan.run.files.output import csv_bytes, write_whole
 from raychan.run.result import Result
 from raychan.run.simulate import simulate
 from raychan.study.detection_tracks import NOISE, Track, follow

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
-from raychan.run.output_files import csv_bytes, write_whole
+from raychan.run.files.output import csv_bytes, write_whole
 from raychan.study import (
     regimes_angle,
     regimes_bistatic,

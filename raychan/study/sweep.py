@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from raychan.run.clock import STAGES
-from raychan.run.output_files import csv_bytes, write_whole
+from raychan.run.files.output import csv_bytes, write_whole
 from raychan.run.result import Result
 from raychan.run.simulate import simulate
 from raychan.study.visibility import WAYS, Visibility, check_target, visibility

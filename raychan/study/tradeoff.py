@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from raychan.run.output_files import csv_bytes, write_whole
+from raychan.run.files.output import csv_bytes, write_whole
 from raychan.study import cases, methods, street
 from raychan.study.cases import TARGETS, Street, Target
 

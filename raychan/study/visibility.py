@@ -13,7 +13,7 @@ from raychan.processing.range_doppler import range_doppler
 from raychan.radar.declared import check_type
 from raychan.radar.radar import Radar
 from raychan.records import DIFFRACT, MIRROR, Facets, Paths, Points
-from raychan.run.labels import Chains, chains, label_of
+from raychan.run.explanation.labels import Chains, chains, label_of
 from raychan.run.receiver import noise_of_beam
 from raychan.run.result import DIRECT, MULTIPATH, Explanation, Result
 from raychan.run.solver import paths_over_wedges

@@ -199,7 +199,7 @@ def draw(
 
 def rays_of(result: Result, most: int = _RAYS) -> tuple[Ray, ...]:
     """Return the strongest path of each chain behind a detection, weakest first; without detections, of every chain."""
-    from raychan.run.labels import chains
+    from raychan.run.explanation.labels import chains
 
     paths, known = result.paths, chains(result.paths, result.receiver.background)
     size = np.abs(paths.amplitude)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from raychan.run.explain import CellExplanation
-from raychan.run.output_files import write_picture
+from raychan.run.files.output import write_picture
 from raychan.run.result import Result
 from raychan.view import plain
 from raychan.view.drawing import Drawing, draw

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from raychan.poses import rotation
 from raychan.report.ship_figures import colours
-from raychan.run.ship_files import COLUMNS, ShipLog
-from raychan.run.ship_scene import ShipScene
+from raychan.run.ship.files import COLUMNS, ShipLog
+from raychan.run.ship.scene import ShipScene
 from raychan.sensors.laser import SEA
 from raychan.view.drawing import Drawing, Shape
 

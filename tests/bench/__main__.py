@@ -34,7 +34,7 @@ from bench.size import size
 from bench.synthesis import phase_noise, scaling, synthesis
 from bench.threads import threads
 from bench.turbine import turbine
-from raychan.run.output_files import write_whole
+from raychan.run.files.output import write_whole
 from raychan.run.storage import versions
 
 Benchmark = Callable[[Path, int, bool], Iterator[Row]]

@@ -14,7 +14,7 @@ import numpy as np
 
 import raychan as rc
 from bench.measure import Row, barred, paired
-from raychan.run.scene_refinement import SceneRefinement
+from raychan.run.refinement.scene_refinement import SceneRefinement
 
 _BAR = 0.7
 _MODES = ("auto", "physical")

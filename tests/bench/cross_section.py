@@ -19,9 +19,9 @@ import trimesh
 import raychan as rc
 from bench.measure import Row
 from raychan.poses import direction
-from raychan.run.rcs_refinement import refinements
-from raychan.run.scattering import scattering
-from raychan.run.single_body import facets_of, mesh_of
+from raychan.run.cross_section.refinement import refinements
+from raychan.run.cross_section.scattering import scattering
+from raychan.run.cross_section.single_body import facets_of, mesh_of
 from raychan.tracing.legs import Leg
 from raychan.world.geometry import Geometry
 from raychan.world.mesh import make_mesh

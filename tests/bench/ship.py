@@ -11,8 +11,8 @@ import numpy as np
 import trimesh
 
 from bench.measure import Row, barred, paired, seconds
-from raychan.run.ship_loop import ShipLoop
-from raychan.run.ship_scene import ShipScene, ship_scene
+from raychan.run.ship.loop import ShipLoop
+from raychan.run.ship.scene import ShipScene, ship_scene
 from raychan.world.body import Body
 from raychan.world.scene import Scene
 

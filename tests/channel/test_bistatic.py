@@ -9,10 +9,10 @@ from support.facets import facets, quad
 from truth import mie, po
 
 from raychan.poses import direction
+from raychan.run.cross_section.refinement import refinements
+from raychan.run.cross_section.scattering import scattering
+from raychan.run.cross_section.single_body import facets_of
 from raychan.run.rcs import rcs
-from raychan.run.rcs_refinement import refinements
-from raychan.run.scattering import scattering
-from raychan.run.single_body import facets_of
 from raychan.tracing.legs import Leg
 from raychan.tracing.radiation import exit_points
 from raychan.units import C0

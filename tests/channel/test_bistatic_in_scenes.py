@@ -11,9 +11,9 @@ from truth import po
 
 from raychan.channel.transfer import transfer
 from raychan.poses import theta_phi
+from raychan.run.cross_section.refinement import refinements
+from raychan.run.cross_section.single_body import facets_of
 from raychan.run.rcs import rcs
-from raychan.run.rcs_refinement import refinements
-from raychan.run.single_body import facets_of
 from raychan.tracing.legs import Leg
 from raychan.tracing.mirrors import Mirror
 from raychan.tracing.shooting import tube_routes

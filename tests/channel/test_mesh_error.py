@@ -9,8 +9,8 @@ from scipy.special import h2vp, hankel2, jv, jvp
 from truth import mie, shapes
 
 from raychan.channel.mesh_error import creeping
+from raychan.run.cross_section.single_body import facets_of, mesh_of
 from raychan.run.rcs import rcs
-from raychan.run.single_body import facets_of, mesh_of
 from raychan.units import C0
 from raychan.world.creases import alternatives
 from raychan.world.geometry import Geometry

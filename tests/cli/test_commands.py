@@ -195,9 +195,9 @@ def test_ctrl_c_ends_with_130_and_leaves_nothing(scene, tmp_path):
 
 _STOPPED_IN_REFINEMENT = """
 import os, signal, sys
-import raychan.run.scene_refinement, raychan.cli
+import raychan.run.refinement.scene_refinement, raychan.cli
 signal.signal(signal.SIGINT, signal.default_int_handler)
-raychan.run.scene_refinement.changes = lambda *a: os.kill(os.getpid(), signal.SIGINT)
+raychan.run.refinement.scene_refinement.changes = lambda *a: os.kill(os.getpid(), signal.SIGINT)
 sys.exit(raychan.cli.invoke(["run", {scene!r}, "--out", {out!r}]))
 """
 

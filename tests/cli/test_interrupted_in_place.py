@@ -10,7 +10,7 @@ import pytest
 from support.scene_texts import PLATE, but_compiling
 
 from raychan.cli import invoke
-from raychan.run.in_place import held
+from raychan.run.files.in_place import held
 
 SHIP = "[run]\nduration_s = 1.0\n[[bodies]]\nname = 'pier'\nshape = 'box'\nposition = [20, 10, 0]\n"
 RCS = ["rcs", "--shape", "plate", "--azimuth", "0:4:2", "--out", "{out}/r.csv", "--plot", "{out}/r.png"]
@@ -34,7 +34,8 @@ COMMANDS = {
 _INTERRUPTED = """
 import os, signal
 import raychan.cli
-from raychan.run import atomic_swap, output_files
+from raychan.run.files import atomic_swap
+from raychan.run.files import output as output_files
 signal.signal(signal.SIGINT, signal.default_int_handler)
 def twice(real):
     def moved(*given, **named):

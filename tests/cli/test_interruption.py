@@ -123,9 +123,9 @@ def test_a_closed_terminal_ends_a_run_in_order_and_not_one_under_nohup(before, c
 
 _STOPPED_AS_IT_REPORTS = """
 import os, signal
-import raychan.run.messages, raychan.cli
+import raychan.run.messages.results, raychan.cli
 signal.signal(signal.SIGINT, signal.default_int_handler)
-raychan.run.messages.notes = lambda result: os.kill(os.getpid(), signal.SIGINT)
+raychan.run.messages.results.notes = lambda result: os.kill(os.getpid(), signal.SIGINT)
 raychan.cli.main(["run", {scene!r}, "--out", {out!r}, "--no-pictures"])
 """
 

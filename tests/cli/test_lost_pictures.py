@@ -9,8 +9,8 @@ import pytest
 from support.scene_texts import PLATE, but_compiling
 
 from raychan.cli import invoke
-from raychan.run import output_files
-from raychan.run.output_files import StoreError
+from raychan.run.files import output as output_files
+from raychan.run.files.output import StoreError
 
 SHIP = "[run]\nduration_s = 1.0\n[[bodies]]\nname = 'pier'\nshape = 'box'\nposition = [20, 10, 0]\n"
 RUN = {"result.nc", "detections.csv", "summary.json"}

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from raychan.run import ship_schema
+from raychan.run.ship import schema as ship_schema
 from raychan.world.schema_base import Table
 
 TEXT = (Path(__file__).parents[2] / "docs" / "scene_files.md").read_text(encoding="utf-8")

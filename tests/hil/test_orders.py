@@ -11,7 +11,7 @@ from pynmeagps import NMEAReader
 from raychan.hil.geodesy import FLATTENING, SEMI_MAJOR_M, Origin, geocentric
 from raychan.hil.instruments import Instruments, ScannedShip, reading
 from raychan.hil.orders import Order, OrderReader, order_sentence
-from raychan.run.ship_scene import ship_scene
+from raychan.run.ship.scene import ship_scene
 
 
 def test_an_order_comes_back_as_sent():

@@ -17,7 +17,7 @@ from raychan.hil.scans import decode_scan
 from raychan.hil.session import CHANNELS, SCANNER, Session
 from raychan.hil.summary import one_line, summary, warnings
 from raychan.hil.telegrams import TelegramReader
-from raychan.run.ship_scene import ship_scene
+from raychan.run.ship.scene import ship_scene
 
 
 class Pipe:

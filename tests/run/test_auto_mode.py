@@ -8,7 +8,7 @@ from bench.auto import agreement
 from support.boxes_and_balls import WAVEFORM, scene_of
 
 import raychan as rc
-from raychan.run.map_cells import MapCells
+from raychan.run.refinement.map_cells import MapCells
 from raychan.tracing.legs import legs_over
 from raychan.tracing.lit_legs import lit_legs
 from raychan.world.geometry import geometry_of

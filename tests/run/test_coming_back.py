@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import raychan as rc
-from raychan.run.ledger import SEEN
+from raychan.run.ledger_entry import SEEN
 
 
 def run(shape, bounces, yaw=0.0, height=0.4, alone=False, material=None, power=0.01, **params):

@@ -17,9 +17,9 @@ from raychan.processing.detection import detect
 from raychan.processing.range_doppler import range_doppler
 from raychan.records import SCATTER
 from raychan.run.explain import explain
-from raychan.run.folding import aliased
-from raychan.run.labels import chains, explain_cell, provenance, response_of
-from raychan.run.messages import warned
+from raychan.run.explanation.folding import aliased
+from raychan.run.explanation.labels import chains, explain_cell, provenance, response_of
+from raychan.run.messages.results import warned
 from raychan.run.result import ExplainedDetections
 from raychan.signal.baseband import synthesize
 from raychan.units import C0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import raychan as rc
-from raychan.run.ledger import SEEN
+from raychan.run.ledger_entry import SEEN
 from raychan.run.mechanisms import interactions
 
 WAVE = rc.Waveform(carrier=24e9, bandwidth=1e9, chirp_duration=40e-6, n_chirps=16, n_samples=128)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import raychan as rc
-from raychan.run.going_on import going_on, shorter
-from raychan.run.labels import alike
+from raychan.run.explanation.labels import alike
+from raychan.run.ledger.going_on import going_on, shorter
 from raychan.run.mechanisms import interactions
 from raychan.world.geometry import geometry_of
 

@@ -10,7 +10,7 @@ import pytest
 from raychan.processing.main_lobe import MainLobe
 from raychan.radar import near_spectrum, side_lobes
 from raychan.radar.windows import NAMES, window
-from raychan.run import point_spread
+from raychan.run.explanation import point_spread
 
 
 @pytest.mark.parametrize("n", [300, 301])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from raychan.channel.error import COVER
-from raychan.run.map_cells import ALONG, MapCells, feeding_sources
+from raychan.run.refinement.map_cells import ALONG, MapCells, feeding_sources
 
 SHALLOW, DEEP = 1 << 31, 2 << 31  # sources of facet 0: bounces 1 and 2
 

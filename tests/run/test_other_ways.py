@@ -10,7 +10,7 @@ import pytest
 import raychan as rc
 from raychan.channel.paths import of_trajectories, paths_of
 from raychan.radar.dual_paths import scaled
-from raychan.run.other_ways import OtherWays, last_facets
+from raychan.run.refinement.other_ways import OtherWays, last_facets
 from raychan.run.rules import fine_rule
 from raychan.tracing.solver import Launch
 from raychan.tracing.sources import depth_of, facet_of, legs_of

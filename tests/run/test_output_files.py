@@ -15,9 +15,10 @@ from support.results import paths, result
 from support.scene_texts import PLATE, but_compiling
 
 from raychan.cli import invoke
-from raychan.run import atomic_swap, output_files
-from raychan.run.contents import Contents
-from raychan.run.output_files import StoreError, folder_for, staging, write_together, write_whole
+from raychan.run.files import atomic_swap
+from raychan.run.files import output as output_files
+from raychan.run.files.contents import Contents
+from raychan.run.files.output import StoreError, folder_for, staging, write_together, write_whole
 from raychan.run.storage import CONTENTS, write_result
 
 FOLDERS = [str(TESTS), str(TESTS / "run")]
@@ -98,7 +99,7 @@ def test_what_stands_in_the_way_is_told_and_stays(tmp_path):
 _KILLED = """
 import os, signal, sys
 sys.path[:0] = {folders!r}
-from raychan.run import output_files
+from raychan.run.files import output as output_files
 from test_output_files import KIND, put
 def die(*a, **k):
     os.kill(os.getpid(), signal.SIGKILL)
@@ -109,7 +110,7 @@ if at == "inside":
         (stage / "half.png").write_text("half")
         die()
 elif at == "between renames":
-    from raychan.run import atomic_swap
+    from raychan.run.files import atomic_swap
     atomic_swap._exchange_at_once = lambda new, old: False
     rename, calls = os.rename, []
     def once(a, b):

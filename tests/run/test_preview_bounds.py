@@ -9,9 +9,9 @@ import pytest
 from support.places import SCENES
 
 import raychan as rc
-from raychan.run.preview import preview_rule
-from raychan.run.preview_bounds import NEAR, facet_bounds
-from raychan.run.preview_launch import legs_over_ground, that_count
+from raychan.run.preview.bounds import NEAR, facet_bounds
+from raychan.run.preview.frame import preview_rule
+from raychan.run.preview.launch import legs_over_ground, that_count
 from raychan.tracing.contributions import SHARE, Contributions, amplitudes
 from raychan.tracing.culling import seed_facets
 from raychan.tracing.radiation import phases_of

@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 import raychan as rc
-from raychan.run import preview_launch
+from raychan.run.preview import launch as preview_launch
 
 
 def preview_of(*bodies: rc.Body, carrier: float, height: float, chirps: int, noise: bool = True) -> rc.Result:

@@ -10,10 +10,10 @@ import pytest
 from support.boxes_and_balls import scene_of
 
 import raychan as rc
-from raychan.run.point_spread import PointSpread
-from raychan.run.probes import probes_of
+from raychan.run.explanation.point_spread import PointSpread
 from raychan.run.receiver import map_of
-from raychan.run.sourced_paths import changes
+from raychan.run.refinement.probes import probes_of
+from raychan.run.refinement.sourced_paths import changes
 from raychan.signal.baseband import synthesize
 from raychan.tracing.sources import EXACT
 from raychan.units import C0

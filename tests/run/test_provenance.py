@@ -15,7 +15,7 @@ from raychan.radar.antenna import IsotropicAntenna
 from raychan.radar.radar import Radar
 from raychan.records import REFLECT, SCATTER, TRANSMIT
 from raychan.run.explain import explain
-from raychan.run.labels import chains, explain_cell, response_of
+from raychan.run.explanation.labels import chains, explain_cell, response_of
 from raychan.signal.baseband import synthesize
 
 GROUND, SUV, TRUCK, WALKER = range(4)

@@ -11,8 +11,8 @@ from truth import corner, mie, po
 
 from raychan.em.fresnel import coefficients_array
 from raychan.records import HALF_SPACE, LAYER
+from raychan.run.cross_section.single_body import facets_of
 from raychan.run.rcs import rcs
-from raychan.run.single_body import facets_of
 from raychan.units import C0
 from raychan.world.material import Material
 

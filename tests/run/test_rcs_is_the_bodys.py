@@ -8,8 +8,8 @@ import trimesh
 from support.targets import F, amplitudes, ball, bodies, db, sigma, tube, view
 from truth import mie
 
+from raychan.run.cross_section.single_body import facets_of
 from raychan.run.rcs import rcs
-from raychan.run.single_body import facets_of
 from raychan.units import C0
 from raychan.world.material import Material
 from raychan.world.mesh import make_mesh

@@ -11,8 +11,8 @@ from support.targets import F, db, rms, view
 
 from raychan.channel.transfer import transfer
 from raychan.poses import theta_phi
-from raychan.run.rcs_refinement import refinements
-from raychan.run.single_body import facets_of
+from raychan.run.cross_section.refinement import refinements
+from raychan.run.cross_section.single_body import facets_of
 from raychan.tracing.legs import Leg
 from raychan.tracing.shooting import tube_routes
 from raychan.units import C0

@@ -89,7 +89,7 @@ def test_the_true_error_lies_within_the_stated_one_and_not_far_within(monkeypatc
         # Physical optics is the truth here; nobody wants the error of creeping waves left out, so no argument does it.
         with monkeypatch.context() as m:
             if i % 7 != 1:
-                m.setattr("raychan.run.rcs_refinement.creeping", lambda *_: (0.0, 0.0))
+                m.setattr("raychan.run.cross_section.refinement.creeping", lambda *_: (0.0, 0.0))
             got = rcs(mesh, F, az, el, distance=d, material=material)
         true.append(abs(float(db(got.sigma / exact))))
         stated.append(float(got.error_db))

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from raychan.run.map_cells import MapCells
-from raychan.run.refinement_budget import FORESEEN, RAYS, SECONDS
-from raychan.run.refinement_plan import SLOW, planned
+from raychan.run.refinement.budget import FORESEEN, RAYS, SECONDS
+from raychan.run.refinement.map_cells import MapCells
+from raychan.run.refinement.plan import SLOW, planned
 from raychan.tracing.shooting import Wanted
 from raychan.tracing.source_rays import SourceRays
 from raychan.tracing.sources import source_of

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import raychan as rc
-from raychan.run import refinement_seconds
 from raychan.run.clock import Clock
-from raychan.run.refinement_seconds import Pace, StepRays
+from raychan.run.refinement import seconds as refinement_seconds
+from raychan.run.refinement.seconds import Pace, StepRays
 from raychan.run.scene_channel import channel_of
 from raychan.run.simulate import result_of
 from raychan.tracing.shooting import Wanted

@@ -9,11 +9,12 @@ import pytest
 from support.boxes_and_balls import WAVEFORM, scene_of
 
 import raychan as rc
-from raychan.run import refinement_budget, scene_refinement
-from raychan.run.point_spread import PointSpread
+from raychan.run.explanation.point_spread import PointSpread
+from raychan.run.refinement import budget as refinement_budget
+from raychan.run.refinement import scene_refinement
+from raychan.run.refinement.scene_refinement import SceneRefinement
+from raychan.run.refinement.sourced_paths import SourcedPaths, changes, raised
 from raychan.run.rules import step_rule
-from raychan.run.scene_refinement import SceneRefinement
-from raychan.run.sourced_paths import SourcedPaths, changes, raised
 from raychan.tracing.sources import depth_of, launches
 from raychan.tracing.stats import Further, Stats
 from raychan.world.geometry import geometry_of

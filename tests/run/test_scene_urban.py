@@ -11,7 +11,7 @@ import pytest
 from support.places import SCENES
 from support.study_tables import table
 
-from raychan.run.labels import provenance
+from raychan.run.explanation.labels import provenance
 from raychan.run.receiver import detections_in, map_of
 from raychan.run.simulate import background, simulate
 from raychan.signal.baseband import synthesize

@@ -11,7 +11,7 @@ from support.scene_texts import PLATE
 import raychan as rc
 from raychan.cli import invoke
 from raychan.run import sequence
-from raychan.run.output_files import StoreError
+from raychan.run.files.output import StoreError
 from raychan.run.sequence import Store
 
 

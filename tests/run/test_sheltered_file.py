@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 
-from raychan.run.sheltered_file import ShelteredFile
+from raychan.run.files.sheltered_file import ShelteredFile
 
 
 class Small(io.BytesIO):
@@ -72,7 +72,7 @@ def test_hdf5_closes_on_a_full_disk_and_a_file_with_room_is_whole(tmp_path):
 _FULL = """
 import resource
 from raychan.cli import invoke
-from raychan.run import ship_files
+from raychan.run.ship import files as ship_files
 ship_files._BLOCK = 20
 _, most = resource.getrlimit(resource.RLIMIT_FSIZE)
 for kib in (2, 4, 8, 12, 14, 16, 18):

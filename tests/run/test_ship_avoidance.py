@@ -8,8 +8,8 @@ from raychan.dynamics import yacht
 from raychan.dynamics.avoidance import Lookout, Prediction
 from raychan.dynamics.ship import PSI, X, Y
 from raychan.dynamics.steering import SteeringGear, lqr
-from raychan.run.ship_loop import ShipLoop
-from raychan.run.ship_scene import ship_scene
+from raychan.run.ship.loop import ShipLoop
+from raychan.run.ship.scene import ship_scene
 
 KEPT = 10.0
 GEAR = SteeringGear(np.radians(30.0), np.radians(15.0))

@@ -9,8 +9,8 @@ from scipy.linalg import expm
 from raychan.dynamics import ship
 from raychan.dynamics.steering import HeadingProgramme, StateFeedback, SteeringGear
 from raychan.dynamics.voyage import LinearPlant, sail
-from raychan.run.ship_loop import ShipLoop
-from raychan.run.ship_scene import ship_scene
+from raychan.run.ship.loop import ShipLoop
+from raychan.run.ship.scene import ship_scene
 from raychan.sensors.laser import NO_BODY, SEA
 
 EAST = {"headings": [[0.0, 90.0]]}

@@ -7,9 +7,9 @@ import pytest
 from typer.testing import CliRunner
 
 from raychan.cli import app
-from raychan.run.ship_loop import ShipLoop
-from raychan.run.ship_places import UNDER_WATER, LostScans, lost_lines
-from raychan.run.ship_scene import ship_scene
+from raychan.run.ship.loop import ShipLoop
+from raychan.run.ship.places import UNDER_WATER, LostScans, lost_lines
+from raychan.run.ship.scene import ship_scene
 
 QUAY = {"name": "quay", "shape": "box", "params": {"length": 10.0, "width": 100.0, "height": 30.0}, "reflectivity": 1.0}
 YACHT = {"ship": {"model": "yacht", "speed_mps": 10.0}, "programme": {"headings": [[0.0, 0.0]]}}

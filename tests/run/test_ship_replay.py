@@ -5,9 +5,9 @@ import pytest
 
 import raychan as rc
 from raychan.cli import invoke
-from raychan.run.ship_loop import ShipLoop
-from raychan.run.ship_replay import read_poses
-from raychan.run.ship_scene import read_ship_scene, ship_scene
+from raychan.run.ship.loop import ShipLoop
+from raychan.run.ship.replay import read_poses
+from raychan.run.ship.scene import read_ship_scene, ship_scene
 from raychan.sensors.laser import SEA
 
 HEAD = "t_s,x_m,y_m,heading_deg,roll_deg\n"

@@ -5,10 +5,10 @@ import pytest
 
 import raychan as rc
 from raychan.dynamics.ship import KNOT, PHI, PSI, U
-from raychan.run.ship_bridge import Steered, bridge_of
-from raychan.run.ship_loop import ShipLoop
-from raychan.run.ship_scene import read_ship_scene, ship_scene
-from raychan.run.ship_schema import ShipFile
+from raychan.run.ship.bridge import Steered, bridge_of
+from raychan.run.ship.loop import ShipLoop
+from raychan.run.ship.scene import read_ship_scene, ship_scene
+from raychan.run.ship.schema import ShipFile
 from raychan.world.build import SHIP_TABLES
 from raychan.world.bundled import ship_names
 from raychan.world.schema import SceneFile

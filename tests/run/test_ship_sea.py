@@ -5,8 +5,8 @@ import pytest
 
 import raychan as rc
 from raychan.poses import rotation
-from raychan.run.ship_loop import ShipLoop
-from raychan.run.ship_scene import ship_scene
+from raychan.run.ship.loop import ShipLoop
+from raychan.run.ship.scene import ship_scene
 from raychan.sensors.laser import SEA
 from raychan.sensors.sea import SeaState, waves
 from raychan.sensors.spot import Echo

@@ -9,7 +9,7 @@ import pytest
 from support.results import WAVE, paths, receiver
 
 import raychan as rc
-from raychan.run.labels import chains, explain_cell, response_of
+from raychan.run.explanation.labels import chains, explain_cell, response_of
 
 SUV = [(1, 4)]
 CELL, RATE = WAVE.range_resolution, WAVE.rate_resolution

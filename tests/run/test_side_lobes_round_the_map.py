@@ -5,8 +5,8 @@ import pytest
 from support.echoes import echoes
 
 import raychan as rc
-from raychan.run.folding import Shown, truth
-from raychan.run.point_spread import PointSpread
+from raychan.run.explanation.folding import Shown, truth
+from raychan.run.explanation.point_spread import PointSpread
 
 WAVE = rc.Waveform(77e9, 300e6, 30e-6, n_chirps=32, n_samples=512)
 LIMIT = WAVE.unambiguous_range

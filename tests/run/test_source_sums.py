@@ -10,10 +10,10 @@ import pytest
 from support.targets import F, view
 from truth import corner
 
-from raychan.run.rcs_refinement import refinements
-from raychan.run.scattering import BodyLaunch, BySource
-from raychan.run.single_body import facets_of
-from raychan.run.source_sums import SourceSums
+from raychan.run.cross_section.refinement import refinements
+from raychan.run.cross_section.scattering import BodyLaunch, BySource
+from raychan.run.cross_section.single_body import facets_of
+from raychan.run.cross_section.source_sums import SourceSums
 from raychan.tracing.legs import Leg
 from raychan.tracing.sources import depth_of
 from raychan.world.geometry import Geometry

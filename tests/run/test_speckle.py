@@ -10,9 +10,9 @@ import pytest
 
 import raychan as rc
 from raychan.records import MIRROR, REFLECT, SCATTER
-from raychan.run.point_spread import PointSpread
-from raychan.run.scene_refinement import SceneRefinement
-from raychan.run.speckle import SHIFT, TURN, slopes_of, spreads_db
+from raychan.run.explanation.point_spread import PointSpread
+from raychan.run.refinement.scene_refinement import SceneRefinement
+from raychan.run.refinement.speckle import SHIFT, TURN, slopes_of, spreads_db
 from raychan.tracing.stats import Stats
 from raychan.units import C0, db
 from raychan.world.geometry import geometry_of

@@ -13,8 +13,8 @@ from support.results import paths, result
 
 import raychan as rc
 from raychan.records import REFLECT, SCATTER
-from raychan.run.ledger import Entry, ModelChoice
-from raychan.run.output_files import StoreError
+from raychan.run.files.output import StoreError
+from raychan.run.ledger_entry import Entry, ModelChoice
 from raychan.run.storage import COLUMNS, load_result, save_result
 from raychan.units import C0
 

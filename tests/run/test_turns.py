@@ -8,7 +8,7 @@ from truth.corner import corner
 
 import raychan as rc
 from raychan.records import DIFFUSE, REFLECT, SCATTER, TRANSMIT
-from raychan.run.turns import turns_of
+from raychan.run.explanation.turns import turns_of
 from raychan.units import C0
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import raychan as rc
+from raychan.run.explanation.two_ways import apart
 from raychan.run.result import Explanation
-from raychan.run.two_ways import apart
 
 WAVE = rc.Waveform(carrier=77e9, bandwidth=500e6, chirp_duration=30e-6, n_chirps=48, n_samples=128)
 BALL = rc.Body("ball", shape="sphere", params={"radius": 0.3}, position=(7.0, -1.0, 0.5))

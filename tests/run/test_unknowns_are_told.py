@@ -20,8 +20,8 @@ from raychan.records import SCATTER as SCATTERS
 from raychan.report.canvas import figure as drawing
 from raychan.report.figures import rdmap_picture
 from raychan.run.convergence import figure
-from raychan.run.ledger import UNKNOWN, Entry
-from raychan.run.messages import counts, marks, noted, warned
+from raychan.run.ledger_entry import UNKNOWN, Entry
+from raychan.run.messages.results import counts, marks, noted, warned
 from raychan.run.storage import load_result, save_result, summary
 from raychan.study.sweep import Seen, Step, cells
 from raychan.study.validation.sections import Echo

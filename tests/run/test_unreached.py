@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from raychan.run.map_cells import MapCells
-from raychan.run.unreached import Remains, Unreached, unreached_of
+from raychan.run.refinement.map_cells import MapCells
+from raychan.run.refinement.unreached import Remains, Unreached, unreached_of
 
 SHALLOW, DEEP = 1 << 31, 2 << 31  # sources of facet 0: bounces 1 and 2
 FACETS = SimpleNamespace(

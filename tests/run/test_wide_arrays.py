@@ -3,7 +3,7 @@
 import numpy as np
 
 import raychan as rc
-from raychan.run.wide_arrays import WIDE
+from raychan.run.ledger.wide_arrays import WIDE
 
 
 def _run(width):

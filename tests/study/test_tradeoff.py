@@ -7,7 +7,7 @@ import pytest
 from truth import po
 
 from raychan.cli import invoke
-from raychan.run.single_body import facets_of
+from raychan.run.cross_section.single_body import facets_of
 from raychan.study import cases, methods
 from raychan.study.ray_lattice import Window, echoes
 from raychan.study.specular_points import specular_points

@@ -9,8 +9,8 @@ import numpy as np
 
 from raychan.radar.waveform import Waveform
 from raychan.records import Cube, Detections, MapError, Paths, Profile, RangeDoppler
-from raychan.run.labels import provenance
-from raychan.run.ledger import Entry
+from raychan.run.explanation.labels import provenance
+from raychan.run.ledger_entry import Entry
 from raychan.run.result import ExplainedDetections, Receiver, Result
 
 WAVE = Waveform(

@@ -9,8 +9,8 @@ import numpy as np
 import trimesh
 from truth import corner, po, slab
 
-from raychan.run.rcs_refinement import refinements
-from raychan.run.scattering import scattering
+from raychan.run.cross_section.refinement import refinements
+from raychan.run.cross_section.scattering import scattering
 from raychan.tracing.legs import Leg
 from raychan.units import C0
 from raychan.world.geometry import Geometry

@@ -15,11 +15,11 @@ from typer.testing import CliRunner
 import raychan as rc
 from raychan.cli import app
 from raychan.run.clock import Clock
-from raychan.run.launch_messages import uncut
+from raychan.run.cross_section.single_body import facets_of
+from raychan.run.messages.launches import uncut
 from raychan.run.rules import demand, fine_rule
 from raychan.run.scene_channel import channel_of
 from raychan.run.simulate import result_of
-from raychan.run.single_body import facets_of
 from raychan.tracing.contributions import Contributions
 from raychan.tracing.solver import launch_routes
 from raychan.tracing.stats import Stats

@@ -12,8 +12,8 @@ from support.triangles import nodes, on_patch
 from truth import po
 
 from raychan.geometry.patch_cuts import edge_of_fan, halved
-from raychan.run.rcs_refinement import refinements
-from raychan.run.single_body import facets_of
+from raychan.run.cross_section.refinement import refinements
+from raychan.run.cross_section.single_body import facets_of
 from raychan.tracing.footprints import element_of
 from raychan.tracing.legs import Leg
 from raychan.tracing.shooting import tube_routes

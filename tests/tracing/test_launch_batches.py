@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from raychan.run.rcs_refinement import refinements
-from raychan.run.scattering import scattering
-from raychan.run.single_body import facets_of
+from raychan.run.cross_section.refinement import refinements
+from raychan.run.cross_section.scattering import scattering
+from raychan.run.cross_section.single_body import facets_of
 from raychan.tracing.legs import Leg
 from raychan.world.geometry import Geometry
 from raychan.world.shapes import build

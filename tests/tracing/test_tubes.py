@@ -13,8 +13,8 @@ from truth import corner, po
 
 from raychan.em.phase_integral import triangle_terms
 from raychan.em.phasor import mean_parts, points_for
-from raychan.run.rcs_refinement import refinements
-from raychan.run.single_body import facets_of
+from raychan.run.cross_section.refinement import refinements
+from raychan.run.cross_section.single_body import facets_of
 from raychan.tracing.legs import Leg
 from raychan.tracing.shooting import tube_routes
 from raychan.world.geometry import Geometry

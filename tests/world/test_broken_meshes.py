@@ -14,8 +14,8 @@ from typer.testing import CliRunner
 import raychan as rc
 from raychan.cli import app
 from raychan.geometry.edge_grid import grid_bounds
-from raychan.run.scattering import scattering
-from raychan.run.single_body import facets_of
+from raychan.run.cross_section.scattering import scattering
+from raychan.run.cross_section.single_body import facets_of
 from raychan.tracing.legs import Leg
 from raychan.tracing.shadow_edges import longest_shadows, shadow_edges_of
 from raychan.tracing.tubes import Refinement

@@ -2,7 +2,7 @@
 
 import pytest
 
-from raychan.run.ship_scene import read_ship_scene
+from raychan.run.ship.scene import read_ship_scene
 from raychan.world.errors import SceneError
 from raychan.world.scene import Scene
 

@@ -9,8 +9,8 @@ from truth import shapes
 
 from raychan.channel.mesh_error import mesh_error
 from raychan.geometry.triangles import edge_curvatures
+from raychan.run.cross_section.single_body import facets_of
 from raychan.run.rcs import rcs
-from raychan.run.single_body import facets_of
 from raychan.world.creases import alternatives
 from raychan.world.geometry import Geometry
 from raychan.world.halving import cubic_off, halved

@@ -14,7 +14,8 @@ from support.scene_texts import PLATE
 import raychan as rc
 from raychan.cli import invoke
 from raychan.processing.cfar import fitting_guard
-from raychan.run import rules, ship_schema
+from raychan.run import rules
+from raychan.run.ship import schema as ship_schema
 from raychan.world import limits, schema, schema_antenna, schema_impairments, schema_materials
 from raychan.world.errors import SceneError
 from raychan.world.limits import Limit

@@ -9,7 +9,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from raychan.run.single_body import facets_of
+from raychan.run.cross_section.single_body import facets_of
 from raychan.sensors.laser import NO_BODY, REFLECTIVITY, SEA, Scanner, SensorPoses, beams
 from raychan.study.laser_deck import Deck, ranges, standing
 from raychan.study.laser_detection import AMPLITUDES, BEARINGS, probability, tower

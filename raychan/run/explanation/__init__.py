@@ -1,0 +1,1 @@
+"""Where the level of a map cell comes from."""

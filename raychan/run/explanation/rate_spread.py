@@ -1,0 +1,99 @@
+"""Detections of turning bodies, whose echoes spread over rates: their paths have one rate each, at the frame's start,
+so the map cells that they fill later in the frame are explained from the retraced samples."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.columns import take
+from raychan.radar.radar import Radar
+from raychan.records import Detections, Paths
+from raychan.run.convergence import figure
+from raychan.run.explanation.folding import aliased
+from raychan.run.explanation.labels import Chains, chains, label_of, response_of
+from raychan.run.ledger_entry import Entry
+from raychan.run.result import SIDELOBE, Contribution, Explanation, Receiver
+from raychan.run.segments import Retraced
+from raychan.signal.baseband import synthesize
+from raychan.units import db
+
+Floats = NDArray[np.float64]
+_UNEXPLAINED = 0.1  # of a cell's power: a cell with less from turning bodies is noise (not measured)
+
+
+def meets(paths: Paths, turns: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which paths (n,) meet one of the bodies `turns` (b,)."""
+    body, kind = paths.trajectories.body, paths.trajectories.kind
+    return np.asarray((turns[np.maximum(body, 0)] & (kind > 0)).any(axis=1))[paths.trajectory]
+
+
+def without(paths: Paths, turns: NDArray[np.bool_]) -> Paths:
+    """Return the paths that do not meet the bodies `turns` (b,)."""
+    kept: Paths = take(paths, ~meets(paths, turns))
+    return kept
+
+
+def launch_share(paths: Paths, others: Paths, turns: NDArray[np.bool_], radar: Radar) -> float:
+    """Return the relative power by which two launches differ in the echoes of turning bodies over the first ramp."""
+    one = replace(radar, noise=False, waveform=replace(radar.waveform, n_chirps=1))
+    a, b = (synthesize(take(p, meets(p, turns)), one).samples for p in (paths, others))
+    power = float((np.abs(a) ** 2).sum())
+    return float((np.abs(a - b) ** 2).sum()) / power if power > 0.0 else 0.0
+
+
+def motion(turned: Retraced) -> Entry:
+    """Return the ledger's entry of a frame that was traced more than once."""
+    level = float(db(max(turned.level(), 1e-30)))
+    ends = "" if turned.reached else "; further tracings do not reach the tolerance"
+    how = f"traced {len(turned.times)} times within the frame; their difference, against the whole frame{ends}"
+    return Entry(level, "estimate", how)
+
+
+def claimed(
+    reasons: tuple[Explanation, ...], paths: Paths, turns: NDArray[np.bool_], power: Floats, error: Floats,
+    detections: Detections, receiver: Receiver,
+) -> tuple[Explanation, ...]:  # fmt: skip
+    """Return the explanations, with cells that no path explains assigned to a turning body, and with the error of all
+    cells of turning bodies relative to the power from these.
+
+    Args: turns (b,) which bodies turn; power, error (v, r) [W] of the map of their echoes alone, and its error. Of
+    several turning bodies the one whose paths are nearest in range is taken.
+    """
+    rows = np.flatnonzero(meets(paths, turns))
+    if not len(rows):
+        return reasons
+    known = chains(paths, receiver.background)
+    found = []
+    for i, why in enumerate(reasons):
+        brought = float(power[tuple(detections.cell[i])])
+        if brought < _UNEXPLAINED * why.power:
+            found.append(why)
+            continue
+        off = figure(brought, float(error[tuple(detections.cell[i])]))
+        why = replace(why, predicted=brought, error_db=off)
+        # Paths at the frame's start bring side lobes to what the body fills later.
+        if not why.contributions or why.label == SIDELOBE:
+            why = _given(why, paths, rows, known, receiver)
+        found.append(why)
+    return tuple(found)
+
+
+def _given(why: Explanation, paths: Paths, rows: NDArray[np.int64], known: Chains, receiver: Receiver) -> Explanation:
+    """Return the explanation of a cell assigned to the strongest chain at its range, among `rows` of paths over turning
+    bodies; the rate of that part of the body is not known."""
+    at = 0.5 * paths.length[rows]
+    away, folded = aliased(at, why.range, response_of(receiver))
+    near = away <= away.min() + receiver.waveform.range_resolution
+    chain, strength = known.part[rows], np.abs(paths.amplitude[rows]) ** 2
+    leading = int(np.argmax(np.bincount(chain, strength * near, len(known.names))))
+    mine = np.flatnonzero((chain == leading) & near)
+    strongest = int(mine[np.argmax(strength[mine])])
+    label = label_of(paths, int(rows[strongest]), known.bodies[leading], receiver)
+    names, met = known.names[leading], len(known.bodies[leading])
+    part = Contribution(names, met, why.range, why.rate, 1.0, len(mine))
+    same = mine[folded[mine] == folded[strongest]]
+    true = float(np.average(at[same], weights=strength[same]))
+    return replace(why, label=label, contributions=(part,), folded=bool(folded[strongest]), true_range=true)

@@ -1,0 +1,1 @@
+"""Lines that a run prints and stores."""

@@ -1,0 +1,1 @@
+"""A frame in a fraction of a second: each body scatters once."""

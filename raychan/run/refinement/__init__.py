@@ -1,0 +1,1 @@
+"""Launches over a scene, refined where detections need it."""
