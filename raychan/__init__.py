@@ -34,7 +34,7 @@ _HOME = {
     "CosineAntenna": "raychan.radar.antenna",
     "ArrayAntenna": "raychan.radar.antenna",
     "MeasuredAntenna": "raychan.radar.pattern",
-    "load_antenna": "raychan.world.radar_mount",
+    "load_antenna": "raychan.world.scene_files.radar_mount",
     "Processing": "raychan.radar.processing",
     "Impairments": "raychan.radar.impairments",
     "PhaseNoise": "raychan.radar.impairments",
@@ -115,8 +115,8 @@ if TYPE_CHECKING:
     from raychan.world.errors import SceneError as SceneError
     from raychan.world.material import PEC as PEC
     from raychan.world.material import Material as Material
-    from raychan.world.radar_mount import load_antenna as load_antenna
     from raychan.world.scene import Scene as Scene
+    from raychan.world.scene_files.radar_mount import load_antenna as load_antenna
 
     __version__: str
 

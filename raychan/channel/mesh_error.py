@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from raychan.columns import take
 from raychan.geometry.triangles import edge_folds
-from raychan.world.creases import Alternatives
 from raychan.world.geometry import Geometry
-from raychan.world.halving import cubic_off, halved
-from raychan.world.pieces import pieces
+from raychan.world.meshes.creases import Alternatives
+from raychan.world.meshes.halving import cubic_off, halved
+from raychan.world.meshes.pieces import pieces
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

@@ -65,8 +65,8 @@ def info(
     resolutions, and the figures of its antennas. For an antenna:
     its figures, computed from its pattern, beside the published ones if its file has them. For a mesh: its size and
     defects."""
-    from raychan.world.bundled import found
-    from raychan.world.mesh_io import SUFFIXES, load
+    from raychan.world.mesh_files.mesh_io import SUFFIXES, load
+    from raychan.world.scene_files.bundled import found
 
     writable(plot, (".png", ".pdf", ".svg"))
     source = found(source)
@@ -75,7 +75,7 @@ def info(
             raise typer.BadParameter(f"{source} is no scene file", param_hint="--plot")
         _mesh(load(source, unit=unit or "m", up=up), source, unit or "m", up)
         return
-    from raychan.world.radar_mount import antenna_of, antenna_table, is_antenna
+    from raychan.world.scene_files.radar_mount import antenna_of, antenna_table, is_antenna
 
     if plot is not None and is_antenna(source):
         raise typer.BadParameter(f"{source} is no scene file", param_hint="--plot")
@@ -98,8 +98,8 @@ def info(
 def _mesh(mesh: Any, source: Path, unit: str, up: str | None) -> None:
     import numpy as np
 
-    from raychan.world.creases import uncertain_folds
-    from raychan.world.mesh_io import oddities
+    from raychan.world.mesh_files.mesh_io import oddities
+    from raychan.world.meshes.creases import uncertain_folds
 
     low, high = mesh.bounds
     areas = np.bincount(mesh.part, mesh.areas, minlength=len(mesh.part_names))
@@ -250,7 +250,7 @@ def _chirp(radar: Any) -> list[tuple[str, str]]:
 
 def _antennas(scene: Any) -> list[Table]:
     """Return the figures of the antennas: of one if transmitter and receiver share it, else of each."""
-    from raychan.world.radar_mount import antenna_table, mounted
+    from raychan.world.scene_files.radar_mount import antenna_table, mounted
 
     (key, sent), (other, gathered) = mounted(scene.radar_table)
     uses = [("transmit and receive", key, sent, scene.radar.tx)]

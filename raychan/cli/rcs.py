@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from raychan.run.rcs import Rcs
-    from raychan.world.mesh import Mesh
+    from raychan.world.meshes.mesh import Mesh
 
 _CHUNKS = 50  # parts of the angles, after each of which progress is shown
 
@@ -144,7 +144,7 @@ def rcs(
         _written(out, plot, (az, el), table, found, title, polar)
         show.console().print(table_of(title, table))
         if shape is None and source:
-            from raychan.world.mesh_io import oddities
+            from raychan.world.mesh_files.mesh_io import oddities
 
             show.warn([*mesh.report.warnings(), *oddities(mesh, source[0], unit, up, "--")])
         show.warn([f"smooth surfaces: {found.merged}"] if found.merged else [])
@@ -183,8 +183,8 @@ def _target(
 ) -> tuple[Mesh, str]:
     """Return the mesh of a file, or of a built-in shape with its parameters, and what to call it."""
     if shape is None:
-        from raychan.world.mesh import CREASE_DEG
-        from raychan.world.mesh_io import load
+        from raychan.world.mesh_files.mesh_io import load
+        from raychan.world.meshes.mesh import CREASE_DEG
 
         if len(source) != 1:
             raise typer.BadParameter("give one mesh file, or --shape NAME with its parameters")

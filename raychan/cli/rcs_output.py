@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from raychan.run.rcs import Rcs
-    from raychan.world.mesh import Mesh
+    from raychan.world.meshes.mesh import Mesh
 
 Row = tuple[float, float, float, float, float, float, int, int, bool, float, float]
 """Azimuth [deg], elevation [deg], RCS [m^2], RCS [dBsm], error [dB], its numerical part [dB], rays,
@@ -120,7 +120,7 @@ def uncertainties(mesh: Mesh, found: Rcs, tolerance: float, sure: bool) -> list[
     tolerance."""
     import numpy as np
 
-    from raychan.world.creases import uncertain_folds
+    from raychan.world.meshes.creases import uncertain_folds
 
     lines = [text for text in ["" if sure else uncertain_folds(mesh, "--crease")] if text]
     known, count = found.converged, found.error_db.size

@@ -76,8 +76,8 @@ def run(
 
 def _list() -> None:
     """Print the bundled scenes."""
-    from raychan.world import bundled
     from raychan.world.scene import Scene
+    from raychan.world.scene_files import bundled
 
     rows = [(name, Scene.load(name).title) for name in bundled.names()]
     screen = show.console()

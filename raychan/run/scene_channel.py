@@ -30,7 +30,7 @@ from raychan.tracing.settings import PruneRule
 from raychan.tracing.stats import Stats
 from raychan.world.geometry import Geometry, geometry_of
 from raychan.world.scene import Scene
-from raychan.world.schema import PREVIEW
+from raychan.world.scene_files.schema import PREVIEW
 
 _WHOLE = (
     f"the first launch brings more than {MOST:,} paths, as one for 1 dB or more does: the frame is launched twice as a "

@@ -36,8 +36,8 @@ from raychan.signal.baseband import synthesize
 from raychan.signal.delay_profile import profile_of
 from raychan.world.limits import SEED
 from raychan.world.scene import Scene
+from raychan.world.scene_files.schema import PREVIEW
 from raychan.world.scene_given import check_scene
-from raychan.world.schema import PREVIEW
 
 Detected = tuple[RangeDoppler, Detections, MapError]
 

@@ -37,8 +37,8 @@ from raychan.units import C0
 from raychan.world.geometry import Geometry, geometry_of
 from raychan.world.limits import SEED
 from raychan.world.scene import Scene
+from raychan.world.scene_files.schema import PREVIEW
 from raychan.world.scene_given import check_scene
-from raychan.world.schema import PREVIEW
 
 Floats = NDArray[np.float64]
 

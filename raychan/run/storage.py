@@ -255,8 +255,8 @@ def _scene(text: str, where: str) -> Any:
     if not text:
         return None
     from raychan.world.errors import SceneError
-    from raychan.world.overrides import LATER
     from raychan.world.scene import Scene
+    from raychan.world.scene_files.overrides import LATER
 
     try:
         changes = [line.removeprefix(_CHANGED) for line in text.splitlines() if line.startswith(_CHANGED)]

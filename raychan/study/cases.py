@@ -19,7 +19,7 @@ from raychan.study.ray_lattice import Window, echoes
 from raychan.tracing.legs import Leg
 from raychan.units import C0
 from raychan.world.geometry import Geometry
-from raychan.world.mesh import Mesh
+from raychan.world.meshes.mesh import Mesh
 from raychan.world.ray_caster import RayCaster
 from raychan.world.shapes import build
 

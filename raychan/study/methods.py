@@ -22,7 +22,7 @@ from raychan.study.ray_lattice import Window, echoes
 from raychan.study.specular_points import specular_points
 from raychan.tracing.legs import Leg
 from raychan.world.geometry import Geometry
-from raychan.world.mesh import Mesh
+from raychan.world.meshes.mesh import Mesh
 from raychan.world.ray_caster import RayCaster
 
 Floats = NDArray[np.float64]

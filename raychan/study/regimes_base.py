@@ -17,7 +17,7 @@ from raychan.run.cross_section.single_body import facets_of
 from raychan.tracing.legs import Leg
 from raychan.units import C0
 from raychan.world.geometry import Geometry
-from raychan.world.mesh import Mesh, make_mesh
+from raychan.world.meshes.mesh import Mesh, make_mesh
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.study.regimes_base import Floats, Outcome, Regime, Row, geometry_of
-from raychan.world.mesh import Mesh
+from raychan.world.meshes.mesh import Mesh
 from raychan.world.ray_caster import RayCaster
 from raychan.world.shapes import RIGID, build
 

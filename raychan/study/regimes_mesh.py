@@ -29,7 +29,7 @@ from raychan.study.regimes_base import (
 from raychan.tracing.legs import Leg
 from raychan.world.body import Body
 from raychan.world.geometry import Geometry
-from raychan.world.mesh import Mesh, make_mesh
+from raychan.world.meshes.mesh import Mesh, make_mesh
 from raychan.world.scene import Scene
 from raychan.world.shapes import build
 

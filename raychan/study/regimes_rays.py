@@ -25,7 +25,7 @@ from raychan.study.regimes_base import (
 )
 from raychan.world.body import Body
 from raychan.world.material import Material
-from raychan.world.mesh import Mesh, make_mesh
+from raychan.world.meshes.mesh import Mesh, make_mesh
 from raychan.world.scene import Scene
 from raychan.world.shapes import build
 

@@ -17,7 +17,7 @@ from raychan.study.regimes_base import FREQUENCY, Floats, Outcome, Regime, Row, 
 from raychan.study.regimes_mesh import rectangle
 from raychan.world.body import Body
 from raychan.world.errors import SceneError
-from raychan.world.mesh import make_mesh
+from raychan.world.meshes.mesh import make_mesh
 from raychan.world.scene import Scene
 from raychan.world.shapes import build
 

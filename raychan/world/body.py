@@ -17,13 +17,13 @@ from raychan.records import Role
 from raychan.scalars import plain
 from raychan.units import undb
 from raychan.world import limits, shapes
-from raychan.world.creases import uncertain_folds
 from raychan.world.errors import SceneError, nearest, shown
 from raychan.world.limbs import LimbMotion, limbs_of
 from raychan.world.limits import Limit
 from raychan.world.material import Material
-from raychan.world.mesh import CREASE_DEG, Floats, Mesh
-from raychan.world.mesh_io import check_crease, from_trimesh, load, matrix_of, mesh_file, oddities
+from raychan.world.mesh_files.mesh_io import check_crease, from_trimesh, load, matrix_of, mesh_file, oddities
+from raychan.world.meshes.creases import uncertain_folds
+from raychan.world.meshes.mesh import CREASE_DEG, Floats, Mesh
 from raychan.world.motion import Motion
 from raychan.world.read_only import kept, listed
 

@@ -14,9 +14,9 @@ from raychan.records import MIRROR
 from raychan.units import C0
 from raychan.world.body import Body
 from raychan.world.errors import SceneError
-from raychan.world.mesh import Floats
+from raychan.world.meshes.mesh import Floats
 from raychan.world.point_in_body import Place, in_plane_of, nearest_on, place_of, within
-from raychan.world.schema import RadarTable
+from raychan.world.scene_files.schema import RadarTable
 
 NEAREST = 0.01
 """Least distance [m] of a radar from a point target, or from another radar: nearer ones are at one place."""

@@ -19,13 +19,13 @@ from raychan.geometry.triangles import cluster_bounds, edge_curvatures, extents,
 from raychan.parallel import cached
 from raychan.records import MIRROR, PEC, Facets
 from raychan.world.body import Body
-from raychan.world.inner_spheres import inner_spheres_of
+from raychan.world.meshes.inner_spheres import inner_spheres_of
+from raychan.world.meshes.scene_topology import SceneTopology, closed_pieces
+from raychan.world.meshes.topology import MeshTopology, mesh_topology, point_numbers
 from raychan.world.ray_caster import RayCaster
-from raychan.world.scene_topology import SceneTopology, closed_pieces
-from raychan.world.schema import PREVIEW, Model
+from raychan.world.scene_files.schema import PREVIEW, Model
 from raychan.world.simplified import Merged, traced_scene
 from raychan.world.static_geometry import StaticGeometry, columns, computed_once
-from raychan.world.topology import MeshTopology, mesh_topology, point_numbers
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]

@@ -12,7 +12,7 @@ from raychan.world import checks
 from raychan.world.body import Body
 from raychan.world.errors import SceneError, shown
 from raychan.world.limits import LATER, PLACE
-from raychan.world.schema import RadarTable
+from raychan.world.scene_files.schema import RadarTable
 from raychan.world.surroundings import check_places
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ import numpy as np
 from raychan.poses import yaw_pitch_roll
 from raychan.records import Role
 from raychan.world.errors import SceneError
-from raychan.world.mesh import Floats
+from raychan.world.meshes.mesh import Floats
 from raychan.world.motion import Motion
 from raychan.world.shapes.skeleton import Skeleton
 

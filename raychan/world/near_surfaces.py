@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from raychan.geometry.triangles import planes_of
 from raychan.records import Facets
 from raychan.world.material import resolve
-from raychan.world.mesh import Mesh
+from raychan.world.meshes.mesh import Mesh
 from raychan.world.ray_caster import RayCaster
 
 Bools = NDArray[np.bool_]

@@ -12,7 +12,7 @@ from raychan.geometry.closed_surfaces import winding
 from raychan.records import MIRROR
 from raychan.world.body import Body
 from raychan.world.limbs import alike
-from raychan.world.mesh import Floats, Mesh
+from raychan.world.meshes.mesh import Floats, Mesh
 
 Kept = dict[tuple[str, ...], tuple[tuple[Body, ...], Any]]
 """Bodies by their names, and what was found of them: a body that does not move is the same object at all times."""

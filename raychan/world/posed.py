@@ -13,7 +13,7 @@ from raychan.records import LAYER, MIRROR, Facets, Points
 from raychan.world.body import Body
 from raychan.world.errors import SceneError, nearest
 from raychan.world.material import Material, material, names, resolve
-from raychan.world.mesh import Floats
+from raychan.world.meshes.mesh import Floats
 from raychan.world.static_geometry import StaticGeometry
 
 Index = tuple[list[Material], list[str], list[tuple[NDArray[np.int32], NDArray[np.int32]]]]

@@ -16,26 +16,27 @@ from numpy.typing import NDArray
 from raychan.records import LAYER, Facets, Points
 from raychan.reprs import Described
 from raychan.scalars import plain
-from raychan.world import array_checks, checks, overlaps, overrides
+from raychan.world import array_checks, checks, overlaps
 from raychan.world.body import Body
-from raychan.world.build import body_of, material_of, refuse_ship, scene_text
 from raychan.world.errors import SceneError, shown
 from raychan.world.fixed import Fixed
-from raychan.world.idle_keys import idle_keys
 from raychan.world.later import check_later, check_time, table_at
 from raychan.world.limits import FREQUENCY
 from raychan.world.material import Material, validity
-from raychan.world.mesh import Floats
+from raychan.world.meshes.mesh import Floats
+from raychan.world.meshes.topology import MeshTopology
 from raychan.world.posed import index_of, materials_chosen, points_of, posed, spheres_inside
-from raychan.world.radar_mount import mount, processing_of, radar_of
 from raychan.world.scene_arguments import bodies_of, check_texts, materials_of
-from raychan.world.schema import PREVIEW, BodyTable, InterfererTable, Model, RadarTable, SceneFile
-from raychan.world.schema_errors import checked
-from raychan.world.schema_impairments import AtmosphereTable
+from raychan.world.scene_files import overrides
+from raychan.world.scene_files.build import body_of, material_of, refuse_ship, scene_text
+from raychan.world.scene_files.errors import checked
+from raychan.world.scene_files.idle_keys import idle_keys
+from raychan.world.scene_files.impairments import AtmosphereTable
+from raychan.world.scene_files.radar_mount import mount, processing_of, radar_of
+from raychan.world.scene_files.schema import PREVIEW, BodyTable, InterfererTable, Model, RadarTable, SceneFile
 from raychan.world.seams import over_seams
 from raychan.world.static_geometry import StaticGeometry
 from raychan.world.surroundings import atmosphere_of, attenuation_of, check_places, interferers_of
-from raychan.world.topology import MeshTopology
 
 if TYPE_CHECKING:
     from raychan.em.atmosphere import Atmosphere
@@ -157,7 +158,7 @@ class Scene(Fixed, Described):
 
         Raises: ValueError for what no file can hold: a mesh in memory, an antenna of a class of its own.
         """
-        from raychan.world.scene_text import toml_of
+        from raychan.world.scene_files.scene_text import toml_of
 
         return toml_of(self)
 

@@ -11,8 +11,8 @@ from raychan.world.body import Body
 from raychan.world.errors import SceneError, shown
 from raychan.world.limbs import LimbMotion
 from raychan.world.material import Material
-from raychan.world.schema import BodyTable
-from raychan.world.schema_errors import checked
+from raychan.world.scene_files.errors import checked
+from raychan.world.scene_files.schema import BodyTable
 
 _KEYS = (
     "params", "unit", "up", "forward", "scale", "crease_deg", "materials", "rcs_dbsm", "rcs_point",

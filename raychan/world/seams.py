@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from raychan.records import MIRROR
-from raychan.world import degenerate_faces
 from raychan.world.body import Body
-from raychan.world.mesh import Floats, Ints, opposed_pairs, smooth_normals
+from raychan.world.meshes import degenerate_faces
+from raychan.world.meshes.mesh import Floats, Ints, opposed_pairs, smooth_normals
 
 
 def over_seams(bodies: Sequence[Body]) -> tuple[Body, ...]:

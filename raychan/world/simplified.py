@@ -15,11 +15,11 @@ from raychan.geometry.collapses import Limits
 from raychan.records import MIRROR
 from raychan.units import C0
 from raychan.world.body import Body
-from raychan.world.creases import Alternatives, alternatives, uncertain_facets
-from raychan.world.mesh import Mesh
+from raychan.world.meshes.creases import Alternatives, alternatives, uncertain_facets
+from raychan.world.meshes.mesh import Mesh
+from raychan.world.meshes.simplify import Simplified, simplify
 from raychan.world.near_surfaces import near_surfaces
-from raychan.world.schema import Model
-from raychan.world.simplify import Simplified, simplify
+from raychan.world.scene_files.schema import Model
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

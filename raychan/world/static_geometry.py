@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.world.body import Body
-from raychan.world.mesh import Mesh
+from raychan.world.meshes.mesh import Mesh
 from raychan.world.shared_rows import SharedRows
 
 Floats = NDArray[np.float64]

@@ -14,10 +14,10 @@ from raychan.scalars import plain
 from raychan.world.body import Body
 from raychan.world.checks import NEAREST, outside
 from raychan.world.errors import SceneError, shown
-from raychan.world.radar_mount import radar_of
-from raychan.world.schema import InterfererTable, RadarTable
-from raychan.world.schema_errors import checked
-from raychan.world.schema_impairments import AtmosphereTable
+from raychan.world.scene_files.errors import checked
+from raychan.world.scene_files.impairments import AtmosphereTable
+from raychan.world.scene_files.radar_mount import radar_of
+from raychan.world.scene_files.schema import InterfererTable, RadarTable
 
 if TYPE_CHECKING:
     from raychan.radar.interferer import Interferer

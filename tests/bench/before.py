@@ -42,7 +42,7 @@ import sys, time
 import numpy as np
 import trimesh
 import raychan as rc
-from raychan.world.mesh import make_mesh
+from raychan.world.meshes.mesh import make_mesh
 raw = trimesh.creation.icosphere(subdivisions=int(sys.argv[1]))
 unit = np.asarray(raw.vertices) / np.linalg.norm(raw.vertices, axis=1, keepdims=True)
 def made():

@@ -24,7 +24,7 @@ from raychan.run.cross_section.scattering import scattering
 from raychan.run.cross_section.single_body import facets_of, mesh_of
 from raychan.tracing.legs import Leg
 from raychan.world.geometry import Geometry
-from raychan.world.mesh import make_mesh
+from raychan.world.meshes.mesh import make_mesh
 
 _F, _BOUNCES, _TOLERANCE_DB = 77e9, 3, 0.5
 _WEIGHTS = np.array([1.0, 1.5, 2.25])  # of three launches in the truth, the finest last

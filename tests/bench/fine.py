@@ -14,7 +14,7 @@ import raychan as rc
 from bench.measure import Row, alone, barred
 from bench.size import RADAR, grown
 from raychan.units import C0
-from raychan.world.mesh import Mesh, make_mesh
+from raychan.world.meshes.mesh import Mesh, make_mesh
 from raychan.world.simplified import traced_mesh
 
 _FREQUENCY = 77e9

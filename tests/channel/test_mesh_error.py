@@ -12,10 +12,10 @@ from raychan.channel.mesh_error import creeping
 from raychan.run.cross_section.single_body import facets_of, mesh_of
 from raychan.run.rcs import rcs
 from raychan.units import C0
-from raychan.world.creases import alternatives
 from raychan.world.geometry import Geometry
-from raychan.world.mesh import make_mesh
-from raychan.world.mesh_io import from_trimesh
+from raychan.world.mesh_files.mesh_io import from_trimesh
+from raychan.world.meshes.creases import alternatives
+from raychan.world.meshes.mesh import make_mesh
 
 F = 77e9
 K = 2.0 * np.pi * F / C0

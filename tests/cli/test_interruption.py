@@ -73,7 +73,7 @@ def test_ctrl_c_while_the_command_line_is_imported_ends_with_130():
 
 _STOPPED_LATE = """
 import atexit, os, signal, sys
-import raychan.cli, raychan.world.bundled
+import raychan.cli, raychan.world.scene_files.bundled
 signal.signal(signal.SIGINT, signal.default_int_handler)
 class Last:
     def __del__(self, kill=os.kill, process=os.getpid()):
@@ -81,7 +81,7 @@ class Last:
 def names():
     {late}
     return []
-raychan.world.bundled.names = names
+raychan.world.scene_files.bundled.names = names
 raychan.cli.main(["run"])
 """
 

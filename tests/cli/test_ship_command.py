@@ -13,7 +13,7 @@ from raychan.run.ship import files as ship_files
 from raychan.run.ship.files import CONTENTS, rounded_heading
 from raychan.run.ship.loop import ShipLoop
 from raychan.run.ship.scene import read_ship_scene
-from raychan.world.bundled import ship_names
+from raychan.world.scene_files.bundled import ship_names
 
 SHORT = ["--set", "run.duration_s=9", "--set", "programme.headings=[[0,0],[1,90]]"]
 

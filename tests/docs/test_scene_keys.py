@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from raychan.world.schema import InterfererTable, Model, RadarTable, WaveformTable
-from raychan.world.schema_impairments import AtmosphereTable, ImpairmentsTable
-from raychan.world.schema_materials import DiffuseTable
+from raychan.world.scene_files.impairments import AtmosphereTable, ImpairmentsTable
+from raychan.world.scene_files.materials import DiffuseTable
+from raychan.world.scene_files.schema import InterfererTable, Model, RadarTable, WaveformTable
 
 TEXT = (Path(__file__).parents[2] / "docs" / "scene_files.md").read_text(encoding="utf-8")
 

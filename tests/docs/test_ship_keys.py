@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from raychan.run.ship import schema as ship_schema
-from raychan.world.schema_base import Table
+from raychan.world.scene_files.base import Table
 
 TEXT = (Path(__file__).parents[2] / "docs" / "scene_files.md").read_text(encoding="utf-8")
 SECTION = TEXT[TEXT.index("## A ship's scene") :]

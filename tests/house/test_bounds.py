@@ -14,7 +14,7 @@ from support.places import SCENES, TESTS
 from raychan import rcs
 from raychan.cli import invoke
 from raychan.geometry.triangles import half_edge_ends
-from raychan.world import bundled
+from raychan.world.scene_files import bundled
 
 SCENE_FILES = [SCENES / f"{name}.toml" for name in bundled.names()]
 checked = pytest.mark.skipif(not os.environ.get("NUMBA_BOUNDSCHECK"), reason="wants NUMBA_BOUNDSCHECK=1")

@@ -17,8 +17,8 @@ from raychan.radar.pattern import MeasuredAntenna, PatternError, characteristics
 from raychan.radar.radar import Radar
 from raychan.radar.waveform import Waveform
 from raychan.radar.windows import window
-from raychan.world.radar_mount import antenna_of
-from raychan.world.schema_antenna import AntennaTable
+from raychan.world.scene_files.antenna import AntennaTable
+from raychan.world.scene_files.radar_mount import antenna_of
 
 WAVE = Waveform(77e9, 1e9, 20e-6, 40e-6, 64, 128)
 AHEAD = np.array([[1.0, 0.0, 0.0]])

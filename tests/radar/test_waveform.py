@@ -15,7 +15,7 @@ from raychan.radar.antenna import ArrayAntenna, CosineAntenna, IsotropicAntenna
 from raychan.radar.radar import Radar
 from raychan.radar.waveform import Waveform
 from raychan.units import watt
-from raychan.world.radar_mount import antenna_of
+from raychan.world.scene_files.radar_mount import antenna_of
 
 _TABLE_2 = figures(2)
 _RAMP = _TABLE_2["chirp"] * 1e-6

@@ -16,7 +16,7 @@ from raychan.run.cross_section.scattering import scattering
 from raychan.run.cross_section.single_body import facets_of
 from raychan.tracing.legs import Leg
 from raychan.world.geometry import Geometry
-from raychan.world.mesh import make_mesh
+from raychan.world.meshes.mesh import make_mesh
 
 
 def ball_before_a_comb(teeth):

@@ -12,7 +12,7 @@ from raychan.run.cross_section.single_body import facets_of
 from raychan.run.rcs import rcs
 from raychan.units import C0
 from raychan.world.material import Material
-from raychan.world.mesh import make_mesh
+from raychan.world.meshes.mesh import make_mesh
 
 
 @pytest.mark.parametrize("name", bodies())

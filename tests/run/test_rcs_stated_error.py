@@ -12,7 +12,7 @@ from truth import corner, mie, po
 
 from raychan.run.rcs import rcs
 from raychan.world.material import Material
-from raychan.world.mesh import make_mesh
+from raychan.world.meshes.mesh import make_mesh
 
 
 def apart(a, b):

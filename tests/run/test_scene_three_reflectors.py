@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import raychan as rc
-from raychan.world.bundled import found
+from raychan.world.scene_files.bundled import found
 
 
 @pytest.fixture(scope="module")

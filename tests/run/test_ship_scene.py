@@ -9,9 +9,9 @@ from raychan.run.ship.bridge import Steered, bridge_of
 from raychan.run.ship.loop import ShipLoop
 from raychan.run.ship.scene import read_ship_scene, ship_scene
 from raychan.run.ship.schema import ShipFile
-from raychan.world.build import SHIP_TABLES
-from raychan.world.bundled import ship_names
-from raychan.world.schema import SceneFile
+from raychan.world.scene_files.build import SHIP_TABLES
+from raychan.world.scene_files.bundled import ship_names
+from raychan.world.scene_files.schema import SceneFile
 
 WRONG = {
     "[shipp]\nmodel = 'yacht'": "unknown key 'shipp'; did you mean 'ship'?",

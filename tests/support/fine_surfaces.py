@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 
-from raychan.world.mesh import make_mesh
+from raychan.world.meshes.mesh import make_mesh
 
 
 def _grid(points, normals, shape, **options):

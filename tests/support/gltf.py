@@ -11,7 +11,7 @@ import pytest
 import trimesh
 
 from raychan.world.errors import SceneError
-from raychan.world.mesh_io import load
+from raychan.world.mesh_files.mesh_io import load
 
 BOX = trimesh.creation.box([1.0, 2.0, 3.0])  # 22 m2, 6 m3
 TYPES = {"f": 5126, "b": 5120, "h": 5122, "H": 5123, "B": 5121}

@@ -9,7 +9,7 @@ import numpy as np
 import trimesh
 
 from raychan.run.rcs import rcs
-from raychan.world.mesh import make_mesh
+from raychan.world.meshes.mesh import make_mesh
 from truth import po
 
 F = 77e9

@@ -12,7 +12,7 @@ import pytest
 import trimesh
 
 import raychan as rc
-from raychan.world.mesh import make_mesh
+from raychan.world.meshes.mesh import make_mesh
 
 WORD = "allowed: a text without dots, spaces and control characters"
 

@@ -22,8 +22,8 @@ from raychan.tracing.tubes import Refinement
 from raychan.units import C0
 from raychan.world.errors import SceneError
 from raychan.world.geometry import Geometry
-from raychan.world.mesh import make_mesh, smooth_normals
-from raychan.world.mesh_io import SUFFIXES, from_trimesh, load
+from raychan.world.mesh_files.mesh_io import SUFFIXES, from_trimesh, load
+from raychan.world.meshes.mesh import make_mesh, smooth_normals
 
 F = 77e9
 

@@ -18,7 +18,7 @@ from support.scene_texts import PLATE
 import raychan as rc
 from raychan.cli import invoke
 from raychan.run.ship.scene import read_ship_scene
-from raychan.world import bundled
+from raychan.world.scene_files import bundled
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from support.fine_surfaces import ball, ellipsoid, half_ball, torus
 from raychan.geometry.collapses import UPRIGHT, Limits
 from raychan.geometry.contractions import contract
 from raychan.geometry.half_edges import followed
-from raychan.world.simplify import _net
+from raychan.world.meshes.simplify import _net
 
 LIMITS = Limits(deviation=1e-4, normal=0.1, sag=2e-3, turn=0.3)
 

@@ -9,8 +9,8 @@ import trimesh
 from truth import po, shapes
 
 from raychan.run.rcs import rcs
-from raychan.world.creases import alternatives, uncertain_folds
-from raychan.world.mesh_io import from_trimesh
+from raychan.world.mesh_files.mesh_io import from_trimesh
+from raychan.world.meshes.creases import alternatives, uncertain_folds
 
 
 def gem(height, sides=4, radius=0.1):

@@ -8,9 +8,9 @@ import trimesh
 from truth import po, shapes
 
 from raychan.run.rcs import rcs
-from raychan.world.creases import alternatives, uncertain_folds
-from raychan.world.mesh import make_mesh
-from raychan.world.mesh_io import from_trimesh
+from raychan.world.mesh_files.mesh_io import from_trimesh
+from raychan.world.meshes.creases import alternatives, uncertain_folds
+from raychan.world.meshes.mesh import make_mesh
 
 make = trimesh.creation
 

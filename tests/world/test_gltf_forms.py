@@ -83,7 +83,7 @@ def draco(g):
     ],
 )
 def test_a_form_that_would_be_another_body_is_refused_by_name(form, words, ending, tmp_path, monkeypatch):
-    monkeypatch.setattr("raychan.world.gltf_forms.find_spec", lambda name: None)
+    monkeypatch.setattr("raychan.world.mesh_files.gltf_forms.find_spec", lambda name: None)
     assert words in refused(form, tmp_path, ending)
 
 

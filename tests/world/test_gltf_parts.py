@@ -11,7 +11,7 @@ from support.gltf import BOX, Gltf, refused
 
 from raychan.world.body import Body
 from raychan.world.errors import SceneError
-from raychan.world.mesh_io import from_trimesh
+from raychan.world.mesh_files.mesh_io import from_trimesh
 
 
 def _parts(mesh):

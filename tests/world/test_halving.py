@@ -11,12 +11,12 @@ from raychan.channel.mesh_error import mesh_error
 from raychan.geometry.triangles import edge_curvatures
 from raychan.run.cross_section.single_body import facets_of
 from raychan.run.rcs import rcs
-from raychan.world.creases import alternatives
 from raychan.world.geometry import Geometry
-from raychan.world.halving import cubic_off, halved
-from raychan.world.mesh import make_mesh
-from raychan.world.mesh_io import from_trimesh
-from raychan.world.topology import point_numbers
+from raychan.world.mesh_files.mesh_io import from_trimesh
+from raychan.world.meshes.creases import alternatives
+from raychan.world.meshes.halving import cubic_off, halved
+from raychan.world.meshes.mesh import make_mesh
+from raychan.world.meshes.topology import point_numbers
 
 
 def ellipsoid(axes, subdivisions=2):

@@ -16,11 +16,15 @@ from raychan.cli import invoke
 from raychan.processing.cfar import fitting_guard
 from raychan.run import rules
 from raychan.run.ship import schema as ship_schema
-from raychan.world import limits, schema, schema_antenna, schema_impairments, schema_materials
+from raychan.world import limits
 from raychan.world.errors import SceneError
 from raychan.world.limits import Limit
-from raychan.world.quantities import Within
-from raychan.world.schema_errors import checked
+from raychan.world.scene_files import antenna as schema_antenna
+from raychan.world.scene_files import impairments as schema_impairments
+from raychan.world.scene_files import materials as schema_materials
+from raychan.world.scene_files import schema
+from raychan.world.scene_files.errors import checked
+from raychan.world.scene_files.quantities import Within
 
 TABLES = [
     table

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from raychan.world import merge_coplanar
-from raychan.world.mesh_io import from_trimesh
+from raychan.world.mesh_files.mesh_io import from_trimesh
+from raychan.world.meshes import merge_coplanar
 
 BODIES = {
     "torus of quads": lambda: trimesh.creation.torus(0.6, 0.2, 32, 16),

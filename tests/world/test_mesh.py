@@ -8,8 +8,8 @@ import trimesh
 
 import raychan as rc
 from raychan.world.errors import SceneError
-from raychan.world.mesh import make_mesh, smooth_normals
-from raychan.world.mesh_io import from_trimesh, load
+from raychan.world.mesh_files.mesh_io import from_trimesh, load
+from raychan.world.meshes.mesh import make_mesh, smooth_normals
 
 
 def test_smoothed_normals_of_a_sphere_are_radial():

@@ -11,7 +11,7 @@ import trimesh
 
 from raychan.cli import invoke
 from raychan.world.errors import SceneError
-from raychan.world.mesh_io import load
+from raychan.world.mesh_files.mesh_io import load
 
 PLY = """ply
 format ascii 1.0

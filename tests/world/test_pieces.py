@@ -7,8 +7,8 @@ import trimesh
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from raychan.world.mesh import make_mesh
-from raychan.world.pieces import edges, grouped, pieces
+from raychan.world.meshes.mesh import make_mesh
+from raychan.world.meshes.pieces import edges, grouped, pieces
 from raychan.world.point_in_body import in_plane_of
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import raychan as rc
-from raychan.world.mesh_io import load
+from raychan.world.mesh_files.mesh_io import load
 
 _SQUARE = [(0, 0), (1, 0), (1, 1), (0, 1)]
 

@@ -10,7 +10,7 @@ import pytest
 import trimesh
 
 from raychan.world.errors import SceneError
-from raychan.world.mesh_io import load
+from raychan.world.mesh_files.mesh_io import load
 
 # A cube of edge 1 without a corner of legs of 1/2.
 CORNERS = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (0, 1, 1)]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from raychan.world.errors import SceneError
-from raychan.world.mesh import Mesh
+from raychan.world.meshes.mesh import Mesh
 from raychan.world.shapes import build
 from raychan.world.shapes.prism import ears, prism
 

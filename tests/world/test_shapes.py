@@ -8,8 +8,8 @@ from scipy.spatial import cKDTree
 
 from raychan.geometry.triangles import edge_curvatures
 from raychan.world.errors import SceneError
-from raychan.world.halving import cubic_off
 from raychan.world.material import names
+from raychan.world.meshes.halving import cubic_off
 from raychan.world.shapes import SHAPES, build
 from raychan.world.shapes.curve import End, arcs, half_outline
 from raychan.world.shapes.piece import Assembly

@@ -12,11 +12,11 @@ from raychan.geometry.triangles import edge_curvatures
 from raychan.parallel import run_pair
 from raychan.units import C0
 from raychan.world.geometry import geometry_of
-from raychan.world.mesh import make_mesh
+from raychan.world.meshes.mesh import make_mesh
+from raychan.world.meshes.simplify import simplify
+from raychan.world.meshes.surface_check import Check
 from raychan.world.near_surfaces import near_surfaces
 from raychan.world.simplified import limits_of, traced_alone, traced_mesh, traced_scene
-from raychan.world.simplify import simplify
-from raychan.world.surface_check import Check
 
 F = 24e9
 K = 2.0 * np.pi * F / C0

@@ -9,8 +9,8 @@ import numpy as np
 
 from raychan.records import Facets
 from raychan.world.material import Material, resolve
-from raychan.world.mesh import CREASE_DEG, Mesh, creased
-from raychan.world.mesh_io import from_trimesh, load
+from raychan.world.mesh_files.mesh_io import from_trimesh, load
+from raychan.world.meshes.mesh import CREASE_DEG, Mesh, creased
 
 
 def facets_of(mesh: Any, material: str | Material, frequency: float) -> Facets:

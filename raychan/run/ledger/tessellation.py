@@ -12,8 +12,8 @@ from raychan.radar.radar import Radar
 from raychan.records import BLOCKER, Paths
 from raychan.run.mechanisms import peak
 from raychan.world.geometry import Geometry
-from raychan.world.halving import cubic_off
-from raychan.world.mesh import Mesh
+from raychan.world.meshes.halving import cubic_off
+from raychan.world.meshes.mesh import Mesh
 
 _OPPOSED = 2.0  # of a field's amplitude: largest change by a phase, at pi
 

@@ -15,12 +15,12 @@ from raychan.run.ship.replay import PoseFile, read_poses
 from raychan.run.ship.schema import ScannerTable, ShipBodyTable, ShipFile, SpotTable
 from raychan.sensors.laser import REFLECTIVITY, Scanner
 from raychan.sensors.spot import Echo, Spot
-from raychan.world import bundled, overrides
 from raychan.world.body import Body
-from raychan.world.build import scene_text
 from raychan.world.errors import SceneError, is_guess, nearest
 from raychan.world.scene import Scene
-from raychan.world.schema_errors import checked
+from raychan.world.scene_files import bundled, overrides
+from raychan.world.scene_files.build import scene_text
+from raychan.world.scene_files.errors import checked
 
 Floats = NDArray[np.float64]
 _STEP = 1.0 / 75.0  # s: so often rudder and autopilot act at least, however slow the mirror

@@ -6,7 +6,8 @@ from typing import Literal
 
 from pydantic import model_validator
 
-from raychan.world.quantities import (
+from raychan.world.scene_files.base import Table
+from raychan.world.scene_files.quantities import (
     Angle,
     BeamRange,
     Courses,
@@ -42,8 +43,7 @@ from raychan.world.quantities import (
     Weight,
     Weights,
 )
-from raychan.world.schema import PlacedBodyTable
-from raychan.world.schema_base import Table
+from raychan.world.scene_files.schema import PlacedBodyTable
 
 
 class ShipHeader(Table):

@@ -12,10 +12,10 @@ from typing import Any, Literal
 from pydantic import Field
 
 import raychan
-from raychan.world import overrides
 from raychan.world.errors import SceneError
-from raychan.world.schema import Table
-from raychan.world.schema_errors import checked
+from raychan.world.scene_files import overrides
+from raychan.world.scene_files.errors import checked
+from raychan.world.scene_files.schema import Table
 
 HERE = Path(raychan.__file__).parents[1] / "validation"
 """The study's data in a checkout."""

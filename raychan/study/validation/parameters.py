@@ -13,7 +13,7 @@ from raychan.study.validation.bench import Bench
 from raychan.study.validation.measures import Seen, measure
 from raychan.world.errors import SceneError, nearest
 from raychan.world.material import material
-from raychan.world.radar_mount import antenna_of
+from raychan.world.scene_files.radar_mount import antenna_of
 
 
 @cache

@@ -9,7 +9,7 @@ from typing import Any
 from raychan.scalars import plain
 from raychan.world.errors import SceneError, nearest, shown_in_table
 from raychan.world.limits import HOOPS, LENGTH, PHASE, SAG, WALK
-from raychan.world.mesh import Mesh
+from raychan.world.meshes.mesh import Mesh
 from raychan.world.shapes.basic import box, cylinder, dihedral, ground, plate, sphere, trihedral
 from raychan.world.shapes.cyclist import Cyclist
 from raychan.world.shapes.pedestrian import pedestrian

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from raychan.world.mesh import Mesh
+from raychan.world.meshes.mesh import Mesh
 from raychan.world.shapes.piece import SAG, Assembly, Piece, polygon
 from raychan.world.shapes.solid import block, ellipsoid, pillar
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from raychan.world.mesh import Floats
+from raychan.world.meshes.mesh import Floats
 from raychan.world.shapes.curve import Curve, End, arcs, half_outline, split_at
 from raychan.world.shapes.piece import Bend, Piece
 from raychan.world.shapes.solid import offset_solid

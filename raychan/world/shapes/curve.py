@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from raychan.world.errors import SceneError
-from raychan.world.mesh import Floats
+from raychan.world.meshes.mesh import Floats
 
 _MOST = 1000  # chords of an arc: a sphere with as many has a million facets
 

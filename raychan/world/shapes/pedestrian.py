@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from raychan.world.mesh import Floats, Mesh
+from raychan.world.meshes.mesh import Floats, Mesh
 from raychan.world.shapes.piece import SAG, Assembly
 from raychan.world.shapes.solid import capsule, ellipsoid
 

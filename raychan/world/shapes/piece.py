@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.geometry.triangles import edge_curvatures
-from raychan.world.halving import cubic_off
-from raychan.world.mesh import Floats, Ints, Mesh, make_mesh
+from raychan.world.meshes.halving import cubic_off
+from raychan.world.meshes.mesh import Floats, Ints, Mesh, make_mesh
 
 SAG = 0.3e-3
 """Default largest distance [m] between a curved part and its facets: facets against accuracy (not measured)."""

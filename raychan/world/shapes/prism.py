@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from raychan.world.mesh import Floats, Ints, Mesh
+from raychan.world.meshes.mesh import Floats, Ints, Mesh
 from raychan.world.shapes.piece import Assembly, Piece, join, polygon
 
 _SQUARE = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]

@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from raychan.world.mesh import Floats, Mesh, make_mesh
+from raychan.world.meshes.mesh import Floats, Mesh, make_mesh
 
 
 class Skeleton(Protocol):

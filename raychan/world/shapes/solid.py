@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from raychan.world.mesh import Floats
+from raychan.world.meshes.mesh import Floats
 from raychan.world.shapes.curve import Curve, arcs, mirrored, split_at, steps, trimmed
 from raychan.world.shapes.piece import SAG, Piece, grid, join, polygon
 

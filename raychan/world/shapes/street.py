@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from raychan.world.errors import SceneError
-from raychan.world.mesh import Floats, Mesh
+from raychan.world.meshes.mesh import Floats, Mesh
 from raychan.world.shapes.curve import Curve, steps
 from raychan.world.shapes.piece import SAG, Assembly, Piece, grid, join, polygon
 from raychan.world.shapes.solid import block, capsule, pillar, rounded_block

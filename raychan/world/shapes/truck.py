@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from raychan.world.errors import SceneError
-from raychan.world.mesh import Mesh
+from raychan.world.meshes.mesh import Mesh
 from raychan.world.shapes.piece import BODY_SAG, Assembly
 from raychan.world.shapes.solid import block, capsule, ellipsoid, rounded_block
 from raychan.world.shapes.vehicle import wheel

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from raychan.world.mesh import Floats, Mesh
+from raychan.world.meshes.mesh import Floats, Mesh
 from raychan.world.shapes.bodywork import Form
 from raychan.world.shapes.curve import End
 from raychan.world.shapes.piece import BODY_SAG, Assembly, Piece

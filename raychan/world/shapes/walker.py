@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from raychan.world.mesh import Floats, Mesh
+from raychan.world.meshes.mesh import Floats, Mesh
 from raychan.world.shapes.gait import HIP, Gait
 from raychan.world.shapes.piece import SAG, Assembly, Piece
 from raychan.world.shapes.skeleton import parameters, roll, swing, yaw

@@ -1,0 +1,1 @@
+"""Scene files: their tables and keys, read and written."""
