@@ -101,7 +101,7 @@ def test_the_wheel_holds_the_scenes_beside_the_code_and_the_code_finds_them_ther
         shutil.copytree(ROOT / "raychan", tmp_path / place / "raychan", ignore=shutil.ignore_patterns("__pycache__"))
     (tmp_path / "wheel" / "raychan" / "scenes").mkdir()
     (tmp_path / "wheel" / "raychan" / "scenes" / "only.toml").write_text(PLATE)
-    names = "from raychan.world import bundled; print(bundled.names(), bundled.folder())"
+    names = "from raychan.world.scene_files import bundled; print(bundled.names(), bundled.folder())"
     loads = f"{names}; import raychan; print(raychan.Scene.load('only').title)"
     assert python(loads, tmp_path / "wheel") == f"['only'] {tmp_path}/wheel/raychan/scenes\nA plate ahead\n"
     assert python(names, tmp_path / "bare") == "[] None\n"

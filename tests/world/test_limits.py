@@ -19,16 +19,13 @@ from raychan.run.ship import schema as ship_schema
 from raychan.world import limits
 from raychan.world.errors import SceneError
 from raychan.world.limits import Limit
-from raychan.world.scene_files import antenna as schema_antenna
-from raychan.world.scene_files import impairments as schema_impairments
-from raychan.world.scene_files import materials as schema_materials
-from raychan.world.scene_files import schema
+from raychan.world.scene_files import antenna, impairments, materials, schema
 from raychan.world.scene_files.errors import checked
 from raychan.world.scene_files.quantities import Within
 
 TABLES = [
     table
-    for module in (schema, schema_antenna, schema_impairments, schema_materials, ship_schema)
+    for module in (schema, antenna, impairments, materials, ship_schema)
     for table in vars(module).values()
     if isinstance(table, type) and issubclass(table, BaseModel)
 ]
