@@ -1,5 +1,5 @@
-"""Detections of turning bodies, whose echoes spread over rates: their paths have one rate each, at the frame's start,
-so the map cells that they fill later in the frame are explained from the retraced samples."""
+"""Detections of turning bodies, whose echoes spread over rates: their paths have one rate each, at the frame's middle,
+so the map cells that they fill before and after it are explained from the retraced samples."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def claimed(
             continue
         off = figure(brought, float(error[tuple(detections.cell[i])]))
         why = replace(why, predicted=brought, error_db=off)
-        # Paths at the frame's start bring side lobes to what the body fills later.
+        # Paths at the frame's middle bring side lobes to what the body fills before and after it.
         if not why.contributions or why.label == SIDELOBE:
             why = _given(why, paths, rows, known, receiver)
         found.append(why)
@@ -84,8 +84,9 @@ def claimed(
 def _given(why: Explanation, paths: Paths, rows: NDArray[np.int64], known: Chains, receiver: Receiver) -> Explanation:
     """Return the explanation of a cell assigned to the strongest chain at its range, among `rows` of paths over turning
     bodies; the rate of that part of the body is not known."""
-    at = 0.5 * paths.length[rows]
-    away, folded = aliased(at, why.range, response_of(receiver))
+    response = response_of(receiver)
+    at = response.stands(paths.delay[rows], paths.range_rate[rows], True)[0]
+    away, folded = aliased(at, why.range, response)
     near = away <= away.min() + receiver.waveform.range_resolution
     chain, strength = known.part[rows], np.abs(paths.amplitude[rows]) ** 2
     leading = int(np.argmax(np.bincount(chain, strength * near, len(known.names))))
