@@ -168,7 +168,7 @@ def _ahead(radar: Radar, looks: Floats) -> Floats:
     # An element nearer to the echo by x sees it x / 2 nearer, as only one of both ways is shorter.
     sent, heard = (x @ (y - y.mean(axis=0)).T for x, y in zip(looks, (radar.tx_elements, radar.elements), strict=True))
     nearer = sent[:, :, None] + heard[:, None]
-    return np.asarray(0.5 / wave.range_resolution * nearer.reshape(len(sent), -1))
+    return np.asarray(0.5 / wave.range_resolution * nearer.reshape(len(sent), sent.shape[1] * heard.shape[1]))
 
 
 def _rates_apart(found: ExplainedDetections, reasons: Sequence[Explanation], radar: Radar) -> Floats:

@@ -172,3 +172,12 @@ def test_an_echo_that_shows_in_a_grating_lobe_loses_by_where_it_comes_from():
     losses = beam_losses(lobes.detections, lobes.provenance, radar)
     assert losses.whole == pytest.approx([level(one) - level(lobes)], abs=0.1)
     assert losses.ranges[0] > range_spread(lobes.detections, radar)[1][0] + 0.1
+
+
+def test_before_an_array_that_detects_nothing_nothing_is_lost():
+    wave = rc.Waveform(77e9, 1e9, 20e-6, 40e-6, 16, 128)
+    radar = rc.Radar(wave, power=1e-9, elements=uniform_array(64, STEP))
+    target = rc.Body("target", shape="box", rcs_dbsm=-60.0, position=(20.0, 0.0, 0.0))
+    result = rc.simulate(rc.Scene([target], radar=radar))
+    assert not len(result.detections.range)
+    assert not len(beam_losses(result.detections, result.provenance, radar).whole)
