@@ -4,6 +4,7 @@ so the map cells that they fill before and after it are explained from the retra
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,9 @@ from raychan.run.convergence import figure
 from raychan.run.folding import aliased
 from raychan.run.labels import Chains, chains, label_of, response_of
 from raychan.run.ledger import Entry
+from raychan.run.receiver import quiet_map
 from raychan.run.result import SIDELOBE, Contribution, Explanation, Receiver
+from raychan.run.seen_in_samples import seen_in
 from raychan.run.segments import Retraced
 from raychan.signal.baseband import synthesize
 from raychan.units import db
@@ -53,27 +56,27 @@ def motion(turned: Retraced) -> Entry:
 
 
 def claimed(
-    reasons: tuple[Explanation, ...], paths: Paths, turns: NDArray[np.bool_], power: Floats, error: Floats,
-    detections: Detections, receiver: Receiver,
+    reasons: tuple[Explanation, ...], paths: Paths, turned: Retraced, error: Floats, detections: Detections,
+    receiver: Receiver, radar: Radar, settings: Any,
 ) -> tuple[Explanation, ...]:  # fmt: skip
-    """Return the explanations, with cells that no path explains assigned to a turning body, and with the error of all
-    cells of turning bodies relative to the power from these.
+    """Return the explanations, with cells that no path explains assigned to a turning body, and with the level and the
+    error of all cells of turning bodies by the samples of these, which hold what constant rates do not.
 
-    Args: turns (b,) which bodies turn; power, error (v, r) [W] of the map of their echoes alone, and its error. Of
-    several turning bodies the one whose paths are nearest in range is taken.
+    Args: error (v, r) [W] of the map of their echoes; settings of the processing. Of several turning bodies the one
+    whose paths are nearest in range is taken.
     """
-    rows = np.flatnonzero(meets(paths, turns))
+    rows = np.flatnonzero(meets(paths, turned.turns))
     if not len(rows):
         return reasons
-    known = chains(paths, receiver.background)
+    known, off = chains(paths, receiver.background), error[tuple(detections.cell.T)]
+    power = quiet_map(turned.turning, radar, settings)[tuple(detections.cell.T)]
+    brought, whole = (seen_in(x, detections, radar, settings) for x in (turned.turning, turned.samples))
     found = []
     for i, why in enumerate(reasons):
-        brought = float(power[tuple(detections.cell[i])])
-        if brought < _UNEXPLAINED * why.power:
+        if brought[i] < _UNEXPLAINED * why.power:
             found.append(why)
             continue
-        off = figure(brought, float(error[tuple(detections.cell[i])]))
-        why = replace(why, predicted=brought, error_db=off)
+        why = replace(why, predicted=float(whole[i]), error_db=figure(float(power[i]), float(off[i])))
         # Paths at the frame's middle bring side lobes to what the body fills before and after it.
         if not why.contributions or why.label == SIDELOBE:
             why = _given(why, paths, rows, known, receiver)
