@@ -1,29 +1,51 @@
-"""The instant at which a frame that is traced once is traced: its middle, of which levels, rates and directions are."""
+"""The instant at which a frame is traced: its middle, of which levels, rates and directions are."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 from raychan.run.rules import fine_rule
-from raychan.run.turning import moves_as_one, needed
+from raychan.run.turning import check_often, middle_chirp, moves_as_one, needed
 from raychan.world.errors import SceneError
 from raychan.world.scene import Scene
+from raychan.world.schema import PREVIEW
 
 
-def traced_at(scene: Scene, model: Any) -> tuple[Scene, float, tuple[str, ...]]:
-    """Return a scene as it stands when it is traced, the time [s] of that from the frame's start, and what a user
-    should know of it.
+@dataclass(frozen=True)
+class Instant:
+    """A scene at the start of a frame, and as it stands when its paths are traced."""
 
-    Where nothing moves relative to the radar, or several tracings follow, that is the start.
+    start: Scene
+    scene: Scene
+    time: float
+    """[s] from the frame's start; 0 where nothing moves relative to the radar."""
+    often: bool
+    """Whether the frame takes several tracings, of which this is the one of the middle."""
+    notes: tuple[str, ...] = ()
+    """What a user should know of it."""
+
+
+def traced_at(scene: Scene, model: Any) -> Instant:
+    """Return a scene as it stands when it is traced.
+
+    Raises: SceneError where a frame takes several tracings and its radar or bodies allow one only.
     """
-    time = scene.radar.waveform.centre
-    edge = fine_rule(scene.radar, scene.processing, model).refinement.max_edge
-    if time <= 0.0 or (moves_as_one(scene) and not scene.interferers) or needed(scene, model.retrace, edge):
-        return scene, 0.0, ()
+    edge, wave = fine_rule(scene.radar, scene.processing, model).refinement.max_edge, scene.radar.waveform
+    often = model.mode != PREVIEW and needed(scene, model.retrace, edge)
+    if often:
+        check_often(scene, model.retrace)
+    # Between two tracings routes are carried on from the start of a ramp.
+    time = wave.start_of(middle_chirp(wave.n_chirps)) if often else wave.centre
+    if time <= 0.0 or (moves_as_one(scene) and not scene.interferers):
+        return Instant(scene, scene, 0.0, often)
     try:
         then = scene.at(time)
     except SceneError as problem:
-        return scene, 0.0, (f"levels, rates and directions are those of the frame's start: by its middle {problem}",)
+        if often:
+            raise
+        late = f"levels, rates and directions are those of the frame's start: by its middle {problem}"
+        return Instant(scene, scene, 0.0, often, (late,))
     # The same scene stands alike at each run of it.
     then._derived = scene._derived.setdefault(("at", time), {})
-    return then, time, ()
+    return Instant(scene, then, time, often)

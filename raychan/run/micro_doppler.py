@@ -25,7 +25,7 @@ from raychan.records import DIFFRACT, Paths, Routes
 from raychan.run.between_chirps import carried_between
 from raychan.run.segments import Keyframe, PartFronts, Retraced, Segment, Traced, echoes, joined, reach
 from raychan.run.solver import Batch, solve_into
-from raychan.run.turning import carried_on, check_radar
+from raychan.run.turning import carried_on, middle_chirp
 from raychan.signal.baseband import synthesize
 from raychan.signal.dechirp import ramp_sums
 from raychan.tracing.settings import PruneRule
@@ -58,8 +58,8 @@ def retraced(
     """Return the samples of a frame in which bodies turn.
 
     Args: rule by which each tracing is pruned, from where the radar is then; model the scene's, whose `retrace` is
-    "auto" or the number of tracings (then bodies that only move are extrapolated too); first the paths at the
-    frame's start, if they are known; progress is called with the share done.
+    "auto" or the number of tracings (then bodies that only move are extrapolated too); first the paths of its
+    middle, if they are known (see `run.instant`); progress is called with the share done.
     """
     work = _Frame(scene, rule, model, progress)
     last = scene.radar.waveform.n_chirps - 1
@@ -91,7 +91,6 @@ class _Frame:
     """One frame as it is assembled from keyframes."""
 
     def __init__(self, scene: Scene, rule: PruneRule, model: Any, progress: Callable[[float], None] | None) -> None:
-        check_radar(scene.radar)
         self.scene, self.rule, self.model, self.progress = scene, rule, model, progress
         self.turns = carried_on(scene, model.retrace)
         self.radar: Radar = dataclasses.replace(scene.radar, noise=False)
@@ -104,7 +103,7 @@ class _Frame:
 
     def adaptive(self, last: int, first: Traced | None) -> Retraced:
         """Return the frame, with keyframes added where those on both sides differ by more than the tolerance."""
-        keyframes = [self.keyframe(0, first), self.keyframe(last // 2), self.keyframe(last)]
+        keyframes = [self.keyframe(0), self.keyframe(middle_chirp(last + 1), first), self.keyframe(last)]
         segments = [self.segment(a, b) for a, b in pairwise(keyframes)]
         power = sum(float((np.abs(s.blend()[0]) ** 2).sum()) for s in segments) / self.chirps
         limit = power * (10.0 ** (self.model.tolerance_db / 20.0) - 1.0) ** 2
@@ -132,8 +131,12 @@ class _Frame:
 
     def even(self, last: int, first: Traced | None, count: int) -> Retraced:
         """Return the frame from `count` keyframes at equal distances."""
-        at = np.unique(np.rint(np.linspace(0, last, count)).astype(int))
-        keyframes = [self.keyframe(int(c), first if c == 0 else None) for c in at]
+        at, middle = np.rint(np.linspace(0, last, count)).astype(int), middle_chirp(last + 1)
+        if count % 2:
+            at[count // 2] = middle
+        elif first is not None:
+            self.times.append(middle * self.step)
+        keyframes = [self.keyframe(int(c), first if count % 2 and c == middle else None) for c in np.unique(at)]
         return self.done([self.segment(a, b) for a, b in pairwise(keyframes)])
 
     def segment(self, start: Keyframe, end: Keyframe) -> Segment:
@@ -155,14 +158,14 @@ class _Frame:
         now = self.scene.at(chirp * self.step)
         self.times.append(chirp * self.step)
         wave = self.radar.waveform
-        geometry = (surface_at if known is None else geometry_of)(now, self.model.tolerance_db)
+        geometry, since = (surface_at if known is None else geometry_of)(now, self.model.tolerance_db), 0
         if known is None:
             found: list[Batch] = []
             parts: list[Paths] = []
             rule = dataclasses.replace(self.rule, position=np.asarray(now.radar.position, float))
             stats = solve_into(parts.append, geometry, now.points(), now.radar, wave.carrier, rule, keep=found.append)
             self.rays += stats.rays
-            known = Traced(join(parts), tuple(found))
+            known, since = Traced(join(parts), tuple(found)), chirp
         turned = [take(r, self.touches(r.body, r.kind)) for r in known.routes if isinstance(r, Routes)]
         routes = tuple(r for r in turned if len(r.kind))
         trajectories = known.paths.trajectories
@@ -176,6 +179,7 @@ class _Frame:
             tuple(strengths(r, geometry.facets, now.radar, wave.middle) for r in routes),
             tuple(PartFronts.of(r, geometry.facets, now.radar) for r in routes),
             take(known.paths, rest[known.paths.trajectory]),
+            since,
         )
 
     def touches(self, body: NDArray[np.signedinteger], kind: NDArray[np.signedinteger]) -> NDArray[np.bool_]:
@@ -188,12 +192,12 @@ class _Frame:
         wave = self.radar.waveform
         shape = (2, len(self.radar.elements), last - first + 1, wave.n_samples)
         out = np.zeros(shape, np.complex64)
-        delay_rate = key.others.length_rate / C0 * (first - key.chirp) * self.step
+        delay_rate = key.others.length_rate / C0 * (first - key.since) * self.step
         way = key.others.trajectories
         late = key.others.replace(
             length=key.others.length + C0 * delay_rate,
             amplitude=key.others.amplitude * np.exp(-2j * np.pi * wave.carrier * delay_rate),
-            trajectories=way.replace(instant=way.instant + (key.chirp - first) * self.step),
+            trajectories=way.replace(instant=way.instant + (key.since - first) * self.step),
         )
         frame = dataclasses.replace(wave, n_chirps=last - first + 1)
         out[1] = synthesize(late, dataclasses.replace(self.radar, waveform=frame), first=first).samples

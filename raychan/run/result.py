@@ -74,7 +74,8 @@ class Explanation:
     """What the map shows: of a detection at its peak between cells, of an array in the detection's beam."""
     predicted: float
     """What the paths alone give there: they lack noise, and what a beam of plane waves errs near an array. At the
-    middle of an array whose beam the paths do not explain; in the map cell alone for echoes of turning bodies."""
+    middle of an array whose beam the paths do not explain; by the samples without noise for echoes of turning bodies,
+    or of those that move where `model.retrace` is above 1."""
     error_db: float
     """How far the power may be off, as two launches of tubes differ [dB]; NaN where they differ by so much that it is
     no figure."""

@@ -17,7 +17,7 @@ from scipy.ndimage import maximum_filter
 from raychan.radar.radar import Radar
 from raychan.records import Cube
 from raychan.run.explanation.directions import UNEXPLAINED
-from raychan.run.messages.results import numbers, share_of
+from raychan.run.numbered import numbers, share_of
 from raychan.run.receiver import FAINT, channel, noise_of_beam, quiet_spectrum
 from raychan.run.result import CLUTTER, ExplainedDetections, Explanation
 from raychan.signal.converter import before_rounding, dithered, rounding_error

@@ -13,7 +13,7 @@ from raychan.radar.radar import Radar
 from raychan.records import Cube, Points
 from raychan.run.clock import Clock
 from raychan.run.fluctuation import check
-from raychan.run.instant import traced_at
+from raychan.run.instant import Instant, traced_at
 from raychan.run.ledger_entry import ModelChoice
 from raychan.run.mechanisms import choose
 from raychan.run.messages.launches import merged, uncut
@@ -25,7 +25,7 @@ from raychan.run.refinement.unreached import Remains
 from raychan.run.rules import asked, check_demand, check_rule, fine_rule
 from raychan.run.segments import Retraced, Traced
 from raychan.run.solver import Batch, solve_into
-from raychan.run.turning import carried_on, needed
+from raychan.run.turning import carried_on
 from raychan.tracing.settings import PruneRule
 from raychan.tracing.stats import Stats
 from raychan.world.geometry import Geometry, geometry_of
@@ -73,23 +73,23 @@ def channel_of(scene: Scene, tolerance_db: float | None, max_bounces: int | None
     said = check_demand(scene)
     model = asked(scene.model, tolerance_db, max_bounces)
     with clock.stage("geometry"):
-        scene, time, late = traced_at(scene, model)
+        traced = traced_at(scene, model)
+        scene, time = traced.scene, traced.time
         geometry, points = geometry_of(scene, model.tolerance_db, time), scene.points(0.0)
         beam_of(scene.radar)
-    said += [*merged(geometry), *late]
+    said += [*merged(geometry), *traced.notes]
     if model.mode == PREVIEW:
         with clock.stage("trace"):
             launched, stats = preview_of(geometry, points, scene.radar, scene.processing, model)
         cost = _cost(stats, stats.rays, 1, model, time)
         return Channel(geometry, points, launched, launched, model, None, cost, (*said, *preview_notes()))
-    edge = fine_rule(scene.radar, scene.processing, model).refinement.max_edge
     channel = None
-    if time or not needed(scene, model.retrace, edge):
+    if not traced.often:
         channel = _refined(scene, geometry, points, model, clock)
         if channel is None:
             said.append(_WHOLE)
     if channel is None:
-        channel = _launched_twice(scene, geometry, points, model, clock)
+        channel = _launched_twice(traced, geometry, points, model, clock)
     return replace(channel, warnings=(*said, *channel.warnings))
 
 
@@ -109,9 +109,10 @@ def _refined(scene: Scene, geometry: Geometry, points: Points, model: Any, clock
     return Channel(geometry, points, launched, others, found.model, found.chosen, cost, said, remains=remains)
 
 
-def _launched_twice(scene: Scene, geometry: Geometry, points: Points, model: Any, clock: Clock) -> Channel:
+def _launched_twice(traced: Instant, geometry: Geometry, points: Points, model: Any, clock: Clock) -> Channel:
     """Return the channel of a scene by a fine launch and a coarser one on another lattice, which tells its error."""
-    radar, settings, chosen = scene.radar, scene.processing, None
+    scene, again, chosen = traced.scene, traced.often, None
+    radar, settings = scene.radar, scene.processing
     checked = check_rule(radar, settings, model)
     launch = partial(_launch, geometry, points, radar, settings.range_window)
 
@@ -122,7 +123,6 @@ def _launched_twice(scene: Scene, geometry: Geometry, points: Points, model: Any
             chosen = choose(others.paths, radar, settings, model.tolerance_db)
             model = chosen.applied_to(model)
     rule = fine_rule(radar, settings, model)
-    again = not geometry.facets.since and needed(scene, model.retrace, rule.refinement.max_edge)
     routes: list[Batch] = []
     with clock.stage("trace"):
         fine = partial(launch, rule, progress=clock.tell, keep=routes.append if again else None)
@@ -134,8 +134,8 @@ def _launched_twice(scene: Scene, geometry: Geometry, points: Points, model: Any
     if again:
         check(scene, carried_on(scene, model.retrace))
         with clock.stage("retrace"):
-            traced = Traced(launched.paths, tuple(routes))
-            turned = retraced(scene, rule, model, traced, partial(clock.tell, "retrace"))
+            known = Traced(launched.paths, tuple(routes))
+            turned = retraced(traced.start, rule, model, known, partial(clock.tell, "retrace"))
     rays = stats.rays + more.rays + (turned.rays if turned else 0)
     cost = _cost(stats, rays, len(turned.times) if turned else 1, model, geometry.facets.since)
     return Channel(geometry, points, launched, others, model, chosen, cost, uncut(geometry, stats, more), turned)

@@ -116,6 +116,8 @@ class Keyframe:
     strengths: tuple[Complexes, ...]
     fronts: tuple[PartFronts, ...]
     others: Paths
+    since: int
+    """The chirp to whose start the delays and phases of the other paths refer."""
 
 
 def reach(chirps: int) -> int:

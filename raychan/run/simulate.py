@@ -187,8 +187,7 @@ def _explained(
     if turned:
         left_out["intra-frame motion"] = motion(turned)
         left_out[WIDE] = before_wide_arrays(paths, turned.turns, radar, settings, weakest)
-        brought = quiet_map(turned.turning, radar, settings)
-        reasons = claimed(reasons, paths, turned.turns, brought, error.power, found, receiver)
+        reasons = claimed(reasons, paths, turned, error.power, found, receiver, radar, settings)
     return all_named(reasons, found, no_echo), left_out
 
 

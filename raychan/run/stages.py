@@ -28,7 +28,6 @@ from raychan.run.receiver import (
 from raychan.run.refinement.scene_refinement import SceneRefinement
 from raychan.run.rules import asked, check_rule, fine_rule, rule_of
 from raychan.run.solver import Batch
-from raychan.run.turning import needed
 from raychan.signal.baseband import synthesize as samples_of
 from raychan.tracing.settings import PruneRule
 from raychan.tracing.solver import launch_routes
@@ -89,14 +88,14 @@ def trace(
     """Return the routes of a scene from its radar and back, refined where detections need it, as `simulate` does.
 
     Args: tolerance_db [dB] and max_bounces override the scene's; check: those of one launch, coarser and on another
-    lattice. They are those of the frame's middle, from where their paths are carried back to its start; where bodies
-    turn within a frame, of which `simulate` traces several instants, those of its start.
+    lattice. They are those of the frame's middle, from where their paths are carried back to its start.
     Raises: ValueError on a tolerance or a number of bounces out of range, SceneError for no Scene.
     """
     check_scene(scene)
     check_type("check", check, bool)
     model = asked(scene.model, tolerance_db, max_bounces)
-    scene, time, _ = traced_at(scene, model)
+    traced = traced_at(scene, model)
+    scene, time = traced.scene, traced.time
     radar, settings, points = scene.radar, scene.processing, scene.points(0.0)
     geometry, shift = geometry_of(scene, model.tolerance_db, time), time * np.array([radar.velocity, radar.rx_motion])
     if model.mode == PREVIEW and not check:
@@ -105,7 +104,7 @@ def trace(
         batches = tuple(preview_routes(geometry, points, radar, rule, stats, lambda batch: batch))
         return SceneRoutes(geometry, rule, batches, stats, shift, preview_noise(radar, settings))
     rule = (check_rule if check else fine_rule)(radar, settings, model)
-    if not check and (time or not needed(scene, model.retrace, rule.refinement.max_edge)):
+    if not check and not traced.often:
         stats, launches = Stats(), list[list[Batch]]()
         refinement = SceneRefinement(geometry, points, radar, settings, model, lambda *_: None, stats, launches)
         if (first := refinement.first()) is not None:

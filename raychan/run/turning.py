@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.radar.radar import Radar
+from raychan.world.errors import SceneError
 from raychan.world.scene import Scene
 
 _NEEDED = 1.0  # rad: phase error of constant rates over a frame above which `auto` uses keyframes
@@ -57,12 +57,20 @@ def needed(scene: Scene, retrace: str | int, edge: float) -> bool:
     return bend(scene, edge) > _NEEDED if retrace == "auto" else bool(moving(scene).any())
 
 
-def check_radar(radar: Radar) -> None:
-    """Raise ValueError for a radar whose frames are traced once only."""
+def middle_chirp(chirps: int) -> int:
+    """Return the number of the chirp at whose start the middle tracing of several is made."""
+    return (chirps - 1) // 2
+
+
+def check_often(scene: Scene, retrace: str | int) -> None:
+    """Raise SceneError for a scene whose frames are traced once only."""
+    radar = scene.radar
     refused = {
-        "staggered repetition": bool(radar.waveform.stagger),
-        "receivers of both polarisations": radar.rx_polarization == "both",
-        "receivers elsewhere": radar.rx_position is not None,
+        "staggered repetition (radar.waveform.stagger_us)": bool(radar.waveform.stagger),
+        'receivers of both polarisations (radar.rx_polarization = "both")': radar.rx_polarization == "both",
+        "receivers elsewhere (radar.rx_position)": radar.rx_position is not None,
     }
+    moves = "turn" if retrace == "auto" else "move or turn relative to the radar"
     for what in (name for name, given in refused.items() if given):
-        raise ValueError(f"a frame of {what} is traced once: model.retrace = 1 is wanted where bodies turn")
+        problem = f"{retrace!r} given: with {what} a frame in which bodies {moves} is traced once"
+        raise SceneError(problem, file=scene.path, key="model.retrace", value=retrace, allowed="1")

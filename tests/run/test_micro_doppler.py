@@ -74,7 +74,8 @@ def test_one_tracing_with_rates_is_wrong_where_several_are_right():
     turning = scene(200.0)
     truth, rule = every_chirp(turning)
     frozen = synthesize(simulate(turning, tolerance_db=0.5).paths, turning.radar).samples
-    assert energy_db(frozen - truth, truth) > -15.0
+    # Paths are those of the middle, from which rates differ by half as much as from the start.
+    assert energy_db(frozen - truth, truth) > -18.0
     assert energy_db(retraced(turning, rule, turning.model).samples - truth, truth) < -40.0
 
 

@@ -7,7 +7,7 @@ import pytest
 
 import raychan as rc
 from raychan.radar.array import mimo_array, uniform_array
-from raychan.run.receiver_losses import far_field_distance, migration, near_field_losses, range_spread
+from raychan.run.receiver_losses import beam_losses, far_field_distance, migration, near_field_losses, range_spread
 from raychan.units import C0
 
 STEP = 0.5 * C0 / 77e9
@@ -22,6 +22,11 @@ def run(place, rate=0.0, window="hann", chirps=16, pad=2, azimuth=0.2, bandwidth
     target = {"shape": "box", "rcs_dbsm": 10.0, "rcs_point": (0.0, 0.0, 0.0)}
     body = rc.Body("target", position=place * look, velocity=rate * look, **target)
     return rc.simulate(rc.Scene([body], radar=made)), made
+
+
+def up(loss):
+    """Return a loss [dB] as lines have it, which do not fall short of it."""
+    return f"{np.ceil(10.0 * loss) / 10.0:.1f}"
 
 
 def level(result):
@@ -39,7 +44,7 @@ def test_a_beam_loses_what_is_told_of_a_spherical_wave(receivers, place):
     assert loss == pytest.approx([level(run(place)[0]) - level(near)], abs=0.06)
     said = [x for x in near.warnings if "near field" in x]
     assert len(said) == (loss[0] > 0.5)
-    assert all(f"{loss[0]:.1f} dB less" in x and f"= {far_field_distance(radar):.3g} m" in x for x in said)
+    assert all(f"{up(loss[0])} dB less" in x and f"= {far_field_distance(radar):.3g} m" in x for x in said)
 
 
 def test_an_array_beside_the_phase_centre_loses_no_more_than_about_it():
@@ -72,7 +77,7 @@ def test_a_peak_loses_what_is_told_of_an_echo_that_migrates(window):
         assert moved == pytest.approx([abs(rate) * 256 * 40e-6 / (0.5 * C0 / 1e9)], rel=1e-3)
         said = [x for x in found.warnings if "over range cells" in x]
         assert len(said) == (loss[0] > 0.5)
-        assert all(f"up to {moved[0]:.1f}: peaks read up to {loss[0]:.1f} dB less" in x for x in said)
+        assert all(f"up to {moved[0]:.1f}: peaks read up to {up(loss[0])} dB less" in x for x in said)
 
 
 @pytest.mark.parametrize(("receivers", "place"), [(64, 0.6), (128, 2.0)])
@@ -111,9 +116,11 @@ def test_a_beam_loses_what_is_told_of_ranges_that_differ_over_the_elements(sende
     assert loss[0] + near[0] == pytest.approx(level(one) - found_level(found), abs=0.25)
     across = np.ptp(radar.virtual_elements[:, 1]) * np.sin(azimuth)
     assert differ[0] == pytest.approx(across * 4e9 / C0, rel=2e-3, abs=1e-2)
-    said = [x for x in found.warnings if "over the elements" in x]
-    assert len(said) == (loss[0] > 0.5)
-    assert all(f"by up to {differ[0]:.1f} cells" in x and f"{loss.max():.1f} dB less" in x for x in said)
+    whole = beam_losses(found.detections, found.provenance, radar).whole
+    assert whole[0] == pytest.approx(level(one) - found_level(found), abs=0.25)
+    said = [x for x in found.warnings if "have ranges that differ" in x or "has ranges that differ" in x]
+    assert len(said) == (whole[0] > 0.5)
+    assert all(f"by up to {differ[0]:.1f} cells" in x and f"{up(whole.max())} dB less" in x for x in said)
 
 
 def found_level(result):
@@ -130,3 +137,47 @@ def test_a_weaker_echo_told_apart_in_the_cell_of_a_near_one_is_no_side_lobe_of_i
     ]
     found = rc.simulate(rc.Scene(bodies, radar=radar)).detections
     assert np.sort(found.azimuth) == pytest.approx(azimuths, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("away", "azimuth", "bandwidth"), [(22.0, -0.65, 370e6), (24.0, 0.65, 370e6), (30.0, 0.9, 6e8)]
+)
+def test_losses_that_come_together_are_told_in_one_figure_that_is_not_exceeded(away, azimuth, bandwidth):
+    """Of a near wave whose range differs over the elements each loss alone is less than both."""
+    wide = {"azimuth": azimuth, "bandwidth": bandwidth, "chirps": 24}
+    both, radar = run(away, **wide, **mimo_array(3, 48, STEP * 2.2), multiplexing="tdm")
+    one, _ = run(away, **(wide | {"chirps": 8}))
+    less, said = level(one) - found_level(both), [x for x in both.warnings if "dB less" in x]
+    losses = beam_losses(both.detections, both.provenance, radar)
+    assert losses.whole.max() == pytest.approx(less, abs=0.06)
+    assert max(losses.near.max(), losses.ranges.max()) < less - 0.1
+    told = [float(x.split(" dB less")[0].split()[-1]) for x in said]
+    assert len(told) == 1 and less - 0.03 < told[0] < less + 0.2
+    assert "counted in" in said[0]
+
+
+def test_two_losses_of_which_none_is_told_alone_are_told():
+    wide = mimo_array(3, 48, STEP * 2.2)
+    both, radar = run(22.0, azimuth=0.9, bandwidth=5e8, chirps=24, **wide, multiplexing="tdm")
+    losses = beam_losses(both.detections, both.provenance, radar)
+    assert losses.near[0] < 0.5 and losses.ranges[0] < 0.5 < losses.whole[0]
+    assert sum("dB less" in x and "counted in" in x for x in both.warnings) == 1
+
+
+def test_an_echo_that_shows_in_a_grating_lobe_loses_by_where_it_comes_from():
+    wide = {"azimuth": 0.87, "bandwidth": 1.2e9, "samples": 256}
+    lobes, radar = run(14.0, **wide, elements=uniform_array(32, 4.0 * STEP))
+    assert abs(lobes.detections.azimuth[0]) < 0.4
+    one, _ = run(14.0, **wide)
+    losses = beam_losses(lobes.detections, lobes.provenance, radar)
+    assert losses.whole == pytest.approx([level(one) - level(lobes)], abs=0.1)
+    assert losses.ranges[0] > range_spread(lobes.detections, radar)[1][0] + 0.1
+
+
+def test_before_an_array_that_detects_nothing_nothing_is_lost():
+    wave = rc.Waveform(77e9, 1e9, 20e-6, 40e-6, 16, 128)
+    radar = rc.Radar(wave, power=1e-9, elements=uniform_array(64, STEP))
+    target = rc.Body("target", shape="box", rcs_dbsm=-60.0, position=(20.0, 0.0, 0.0))
+    result = rc.simulate(rc.Scene([target], radar=radar))
+    assert not len(result.detections.range)
+    assert not len(beam_losses(result.detections, result.provenance, radar).whole)

@@ -1,9 +1,10 @@
-"""Detections of turning bodies, whose echoes spread over rates: their paths have one rate each, at the frame's start,
-so the map cells that they fill later in the frame are explained from the retraced samples."""
+"""Detections of turning bodies, whose echoes spread over rates: their paths have one rate each, at the frame's middle,
+so the map cells that they fill before and after it are explained from the retraced samples."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,9 @@ from raychan.run.convergence import figure
 from raychan.run.explanation.folding import aliased
 from raychan.run.explanation.labels import Chains, chains, label_of, response_of
 from raychan.run.ledger_entry import Entry
+from raychan.run.receiver import quiet_map
 from raychan.run.result import SIDELOBE, Contribution, Explanation, Receiver
+from raychan.run.seen_in_samples import seen_in
 from raychan.run.segments import Retraced
 from raychan.signal.baseband import synthesize
 from raychan.units import db
@@ -53,28 +56,28 @@ def motion(turned: Retraced) -> Entry:
 
 
 def claimed(
-    reasons: tuple[Explanation, ...], paths: Paths, turns: NDArray[np.bool_], power: Floats, error: Floats,
-    detections: Detections, receiver: Receiver,
+    reasons: tuple[Explanation, ...], paths: Paths, turned: Retraced, error: Floats, detections: Detections,
+    receiver: Receiver, radar: Radar, settings: Any,
 ) -> tuple[Explanation, ...]:  # fmt: skip
-    """Return the explanations, with cells that no path explains assigned to a turning body, and with the error of all
-    cells of turning bodies relative to the power from these.
+    """Return the explanations, with cells that no path explains assigned to a turning body, and with the level and the
+    error of all cells of turning bodies by the samples of these, which hold what constant rates do not.
 
-    Args: turns (b,) which bodies turn; power, error (v, r) [W] of the map of their echoes alone, and its error. Of
-    several turning bodies the one whose paths are nearest in range is taken.
+    Args: error (v, r) [W] of the map of their echoes; settings of the processing. Of several turning bodies the one
+    whose paths are nearest in range is taken.
     """
-    rows = np.flatnonzero(meets(paths, turns))
+    rows = np.flatnonzero(meets(paths, turned.turns))
     if not len(rows):
         return reasons
-    known = chains(paths, receiver.background)
+    known, off = chains(paths, receiver.background), error[tuple(detections.cell.T)]
+    power = quiet_map(turned.turning, radar, settings)[tuple(detections.cell.T)]
+    brought, whole = (seen_in(x, detections, radar, settings) for x in (turned.turning, turned.samples))
     found = []
     for i, why in enumerate(reasons):
-        brought = float(power[tuple(detections.cell[i])])
-        if brought < _UNEXPLAINED * why.power:
+        if brought[i] < _UNEXPLAINED * why.power:
             found.append(why)
             continue
-        off = figure(brought, float(error[tuple(detections.cell[i])]))
-        why = replace(why, predicted=brought, error_db=off)
-        # Paths at the frame's start bring side lobes to what the body fills later.
+        why = replace(why, predicted=float(whole[i]), error_db=figure(float(power[i]), float(off[i])))
+        # Paths at the frame's middle bring side lobes to what the body fills before and after it.
         if not why.contributions or why.label == SIDELOBE:
             why = _given(why, paths, rows, known, receiver)
         found.append(why)
@@ -84,8 +87,9 @@ def claimed(
 def _given(why: Explanation, paths: Paths, rows: NDArray[np.int64], known: Chains, receiver: Receiver) -> Explanation:
     """Return the explanation of a cell assigned to the strongest chain at its range, among `rows` of paths over turning
     bodies; the rate of that part of the body is not known."""
-    at = 0.5 * paths.length[rows]
-    away, folded = aliased(at, why.range, response_of(receiver))
+    response = response_of(receiver)
+    at = response.stands(paths.delay[rows], paths.range_rate[rows], True)[0]
+    away, folded = aliased(at, why.range, response)
     near = away <= away.min() + receiver.waveform.range_resolution
     chain, strength = known.part[rows], np.abs(paths.amplitude[rows]) ** 2
     leading = int(np.argmax(np.bincount(chain, strength * near, len(known.names))))

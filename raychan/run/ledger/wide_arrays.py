@@ -22,7 +22,7 @@ def before_wide_arrays(paths: Paths, turns: NDArray[np.bool_], radar: Radar, set
     """Return the entry of footprints of turning bodies, which act from their corners alone where several tracings make
     a frame, though the phase at the outermost elements asks for more points.
 
-    Args: paths of the frame's start, where such footprints have as many as they need; turns (b,) which bodies turn;
+    Args: paths of the frame's middle, where such footprints have as many as they need; turns (b,) which bodies turn;
     settings of the processing; weakest power [W] of a detection.
     """
     met, n = paths.trajectories, len(paths.trajectories.kind)

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -14,12 +13,11 @@ from raychan.radar.radar import Radar
 from raychan.records import RangeDoppler
 from raychan.run.explanation.two_ways import apart
 from raychan.run.ledger_entry import SEEN, Entry
-from raychan.run.receiver_losses import beside, far_field_distance, migration, near_field_losses, spreads
+from raychan.run.lost_levels import lost
+from raychan.run.numbered import numbers, share_of, verb
 from raychan.run.result import DC, IMAGE, INTERFERENCE, SIDELOBE, ExplainedDetections, Explanation, Result
 
-_NAMED = 5  # detections that a line names by their numbers
 _LEAST_DB = 0.5  # above the weakest detection: rounds to 1 dB or more
-_LOST_DB = 0.5  # by what a receiver makes of an echo: less is as much as levels are asked for, by default
 
 
 def counts(found: ExplainedDetections, tolerance_db: float | None) -> dict[str, float]:
@@ -39,9 +37,9 @@ def warned(found: ExplainedDetections, tolerance_db: float, rdmap: RangeDoppler)
     """Return a line if detections are not converged, and one if some are folded, or ambiguous."""
     said = []
     if (~found.converged).any():
-        verb = _verb(~found.converged)
+        rows = ~found.converged
         said.append(
-            f"{share_of(~found.converged)} {verb} not converged ({numbers(~found.converged)}): the last two launches "
+            f"{share_of(rows)} {verb(rows)} not converged ({numbers(rows)}): the last two launches "
             f"differ there by about as much as they find, so the error is unknown; more of the budget that "
             f"ended it (model.max_rays, max_seconds, max_memory_mb) or a smaller tolerance than {tolerance_db:g} dB "
             "(--tolerance, model.tolerance_db) may help"
@@ -58,7 +56,7 @@ def warned(found: ExplainedDetections, tolerance_db: float, rdmap: RangeDoppler)
             near = (found.true_range <= rdmap.unambiguous_range) & (np.abs(found.true_rate) <= limit)
             open_ = ", and a slower one where noise leaves its fold open" if (found.folded & near).any() else ""
         said.append(
-            f"{share_of(found.folded)} {_verb(found.folded)} folded ({numbers(found.folded)}): beyond "
+            f"{share_of(found.folded)} {verb(found.folded)} folded ({numbers(found.folded)}): beyond "
             f"{rdmap.unambiguous_range:.4g} m or {limit:.4g} m/s an echo shows elsewhere{open_}; "
             f"number {first + 1} is at {true}, shown at {shown}"
         )
@@ -74,7 +72,7 @@ def mirrored(found: ExplainedDetections, rdmap: RangeDoppler, radar: Radar) -> l
         return []
     slots = ", and by Doppler division in several wrong directions" if radar.multiplexing == "ddm" else ""
     return [
-        f"{share_of(rows)} {_verb(rows)} mirrored ({numbers(rows)}): with real sampling echoes beyond "
+        f"{share_of(rows)} {verb(rows)} mirrored ({numbers(rows)}): with real sampling echoes beyond "
         f"{rdmap.unambiguous_range:.4g} m show at minus their rates and on the other side of boresight{slots}"
     ]
 
@@ -86,49 +84,16 @@ def unsure(found: ExplainedDetections, rdmap: RangeDoppler) -> list[str]:
         rows = found.ambiguous & rdmap.open[tuple(found.cell.T)]
     if rows.any():
         said.append(
-            f"{share_of(rows)} {_verb(rows)} ambiguous in rate and direction ({numbers(rows)}): another rate, a "
+            f"{share_of(rows)} {verb(rows)} ambiguous in rate and direction ({numbers(rows)}): another rate, a "
             f"multiple of {2.0 * rdmap.unambiguous_rate:.4g} m/s away, explains what the receivers see as well, from "
             "another or the same direction; the slowest rate is given"
         )
     if (rows := found.ambiguous & ~rows).any():
         said.append(
-            f"{share_of(rows)} {_verb(rows)} ambiguous in direction ({numbers(rows)}): "
+            f"{share_of(rows)} {verb(rows)} ambiguous in direction ({numbers(rows)}): "
             "a grating lobe of the elements, or the other end of their view, shows another direction alike, or too "
             "nearly so for the noise, or more echoes share a cell than were told apart, or those of a cell may be one "
             "near wave; of equal ones that nearest boresight is given"
-        )
-    return said
-
-
-def lost(found: ExplainedDetections, reasons: Sequence[Explanation], radar: Radar) -> list[str]:
-    """Return a line each if detections lose by spherical waves in a beam, by ranges or rates that differ over the
-    elements, or by migration over range cells."""
-    said = []
-    # The receiver's DC offset is no wave.
-    wave = np.array([why.label != DC for why in reasons], bool)
-    loss = wave * near_field_losses(found, radar)
-    if (near := loss > _LOST_DB).any():
-        limit = far_field_distance(radar)
-        said.append(
-            f"{share_of(near)} {_verb(near)} in the near field of the array ({numbers(near)}), nearer than 2 D^2 / "
-            f"wavelength = {limit:.3g} m: beams are those of plane waves and read up to {loss.max():.1f} dB less of a "
-            "spherical one"
-        )
-    for what, spread in spreads(found, reasons, radar).items():
-        differ, loss = (wave * x for x in spread)
-        if (wide := loss > _LOST_DB).any():
-            said.append(
-                f"{share_of(wide)} {'has' if wide.sum() == 1 else 'have'} {what} that differ over the elements "
-                f"({numbers(wide)}), by up to {differ.max():.1f} cells: beams add one cell of all and read up to "
-                f"{loss.max():.1f} dB less"
-            )
-    moved, loss = migration(found.true_rate, radar)
-    if (fast := loss > _LOST_DB).any():
-        off = beside(moved[fast], radar)
-        stand = f", and may stand up to {off[1]:g} range cells and {off[0]:g} rate cells off" if off.any() else ""
-        said.append(
-            f"{share_of(fast)} {'moves' if fast.sum() == 1 else 'move'} over range cells during the frame "
-            f"({numbers(fast)}), up to {moved.max():.1f}: peaks read up to {loss.max():.1f} dB less{stand}"
         )
     return said
 
@@ -262,7 +227,7 @@ def _above(found: ExplainedDetections, tolerance_db: float) -> str:
     # As many digits as tell it from the tolerance.
     texts = [f"{known.max():.{digits}f}" for digits in (1, 2, 3, 6)]
     shown = next((text for text in texts if float(text) > tolerance_db), texts[-1])
-    return f"; above it {_verb(rows)} {numbers(rows)}, the largest error stated is {shown} dB"
+    return f"; above it {verb(rows)} {numbers(rows)}, the largest error stated is {shown} dB"
 
 
 def _listed(ledger: Mapping[str, Entry], least: float, below: float) -> str:
@@ -273,22 +238,6 @@ def _listed(ledger: Mapping[str, Entry], least: float, below: float) -> str:
     return ", ".join(
         f"{name} {'at most ' if kind == 'bound' else ''}{round(level) + 0.0:+.0f} dB" for level, name, kind in found
     )
-
-
-def share_of(chosen: Any) -> str:
-    """Return how many of all detections are chosen (n,)."""
-    return f"{int(chosen.sum())} of {len(chosen)} detection{'' if len(chosen) == 1 else 's'}"
-
-
-def _verb(chosen: Any) -> str:
-    return "is" if chosen.sum() == 1 else "are"
-
-
-def numbers(chosen: Any) -> str:
-    """Return the numbers of detections, counted from 1 as the table does."""
-    rows = np.flatnonzero(chosen) + 1
-    more = f" and {len(rows) - _NAMED} more" if len(rows) > _NAMED else ""
-    return f"number{'' if len(rows) == 1 else 's'} {', '.join(map(str, rows[:_NAMED]))}{more}"
 
 
 def _place(range: float, rate: float) -> str:

@@ -219,7 +219,8 @@ class Model(Table):
     """Memory of paths: refinement takes no further step that is foreseen to take more."""
     retrace: Literal["auto"] | Tracings = "auto"
     """Number of tracings of a frame. auto: if bodies turn, as many as tolerance_db needs; 1: one, at its middle, whose
-    range rates paths keep; more: all moving bodies are extrapolated between the tracings."""
+    range rates paths keep; more: all moving bodies are extrapolated between the tracings, of an even number one more,
+    at the middle, for the paths."""
     diffuse: Literal["stated", "rough", "off"] = "stated"
     """Diffuse scattering, as clutter. stated: of materials with a diffuse table; rough: also of those with a roughness,
     by Lambert's law; off: none."""
