@@ -9,7 +9,7 @@ from raychan.run.rules import fine_rule
 from raychan.run.turning import check_often, middle_chirp, moves_as_one, needed
 from raychan.world.errors import SceneError
 from raychan.world.scene import Scene
-from raychan.world.schema import PREVIEW
+from raychan.world.scene_files.schema import PREVIEW
 
 
 @dataclass(frozen=True)

@@ -15,10 +15,10 @@ from raychan.records import Detections, Paths
 from raychan.run.convergence import figure
 from raychan.run.explanation.folding import aliased
 from raychan.run.explanation.labels import Chains, chains, label_of, response_of
+from raychan.run.explanation.seen_in_samples import seen_in
 from raychan.run.ledger_entry import Entry
 from raychan.run.receiver import quiet_map
 from raychan.run.result import SIDELOBE, Contribution, Explanation, Receiver
-from raychan.run.seen_in_samples import seen_in
 from raychan.run.segments import Retraced
 from raychan.signal.baseband import synthesize
 from raychan.units import db

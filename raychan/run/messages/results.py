@@ -13,7 +13,7 @@ from raychan.radar.radar import Radar
 from raychan.records import RangeDoppler
 from raychan.run.explanation.two_ways import apart
 from raychan.run.ledger_entry import SEEN, Entry
-from raychan.run.lost_levels import lost
+from raychan.run.messages.lost_levels import lost
 from raychan.run.numbered import numbers, share_of, verb
 from raychan.run.result import DC, IMAGE, INTERFERENCE, SIDELOBE, ExplainedDetections, Explanation, Result
 
