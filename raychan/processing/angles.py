@@ -14,13 +14,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.processing.cell_echoes import CellEchoes
 from raychan.processing.doa import amplitudes, estimate
+from raychan.processing.rivals import Judge, nearest
 from raychan.processing.slots import LONE, Slots
 from raychan.radar.aperture import Aperture
 from raychan.radar.measured import beside_line
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Complexes = NDArray[np.complexfloating[Any, Any]]
 
 _MOST = 8  # echoes in a cell
@@ -29,10 +30,6 @@ _TOLD_BY_LINES, _TOLD_BY_PLANES = 1.0, 0.75
 """Beam widths: echoes farther apart are told apart by Bartlett's beams. Of 120 pairs 0.3 to 1.5 of them apart before
 rectangles 11 are lost so without a word, of 1.0 28, and no run has more echoes than there are."""
 _APART = 0.05  # beam widths: nearer echoes share their power at the noise's whim (not measured)
-_UNTOLD = 0.01  # of an echo's power: waves that were not told apart, weaker than this, move its level by 0.9 dB at most
-_UNTOLD_EVEN = 0.1
-"""The same before a uniform line, whose side lobes are low: of 215 cells of streets before lines of 8, 16
-and 64 two leave that much."""
 _ROUNDS = 20  # of seeking the echoes of different folds by turns (not measured)
 _STILL = 1e-4  # beam widths: echoes of different folds that move less have arrived (not measured)
 _SAFETY = 4.0  # on the power that a plane wave cannot fit (not measured)
@@ -86,59 +83,23 @@ class Scan:
         return np.maximum(share, self.misfit(directions, distances))
 
 
-@dataclass(frozen=True, eq=False)
-class CellEchoes:
-    """Echoes in one cell, strongest first."""
-
-    direction: Floats
-    """Cosines (k, 2) along y and z."""
-    power: Floats
-    """(k,) [W]"""
-    weights: Complexes
-    """Beams (k, s * a): times the cell's snapshot (s * a,) the echoes' waves."""
-    fold: Ints
-    """(k,) how many times more than the snapshot is read."""
-    rest: float = 0.0
-    """Power [W] of the strongest beam of what they leave: more than noise where two echoes were not told apart."""
-    least: float = 0.0
-    """Power [W] below which what they leave is noise, or what of them is no plane wave."""
-
-    @property
-    def explained(self) -> bool:
-        """Whether they leave noise, or what of them is no plane wave."""
-        return self.rest <= self.least
-
-    def by_fold(self) -> dict[int, Floats]:
-        """Return the directions of the echoes of each fold, first that of the strongest."""
-        return {h: self.direction[self.fold == h] for h in dict.fromkeys(self.fold.tolist())}
-
-    @property
-    def noise_gain(self) -> Floats:
-        """Noise power in each beam (k,) over that of one receiver."""
-        return np.asarray((np.abs(self.weights) ** 2).sum(axis=1))
-
-    def unsure(self, aperture: Aperture) -> NDArray[np.bool_]:
-        """Return which directions (k,) may be those of sums of waves not told apart: wrong by a part of a beam width
-        before uniform lines and rectangles, by more where side lobes are high; or of as many unknowns as there are
-        data, which other sets of waves fit as well."""
-        if len(self.power) * (2 + sum(aperture.scans)) >= 2 * self.weights.shape[1]:
-            return np.ones(len(self.power), bool)
-        share = _UNTOLD_EVEN if aperture.uniform else _UNTOLD
-        return np.asarray((self.rest > share * self.power) & (not self.explained))
-
-
-def echoes_in(snapshot: Complexes, scan: Scan, least: float, distance: float, slots: Slots = LONE) -> CellEchoes:
+def echoes_in(
+    snapshot: Complexes, scan: Scan, least: float, distance: float, slots: Slots = LONE, noise: float = 0.0
+) -> CellEchoes:
     """Return the echoes of a cell's snapshot (s * a,), of what its slots hold.
 
-    Args: least, power [W] below which a beam is noise; distance [m] of the cell; slots of transmitters. Two echoes are
-    told apart where both exceed `least` in their beams and what of both is no plane wave; by Bartlett's beams those of
-    one fold only a beam width apart, or three quarters of it where both angles are measured."""
-    cell = _Cell(snapshot[None, :].astype(np.complex128), scan, slots, least, distance)
+    Args: least, power [W] below which a beam is noise; distance [m] of the cell; slots of transmitters; noise [W] of a
+    receiver. Two echoes are told apart where both exceed `least` in their beams and what of both is no plane wave; by
+    Bartlett's beams those of one fold only a beam width apart, or three quarters of it where both angles are measured.
+    """
+    cell = _Cell(snapshot[None, :].astype(np.complex128), scan, slots, least, distance, noise)
     most = min(_MOST, len(scan.aperture.elements) // 2)
     found = cell.grown(slots.folds[:1], most)
     # Of several folds fewer echoes must explain what is explained.
     fewer = len(found.power) - 1 if found.explained else most
-    return found if fewer < 2 or len(slots.folds) == 1 else cell.better(found, cell.grown(slots.folds, fewer))
+    if fewer > 1 and len(slots.folds) > 1:
+        found = cell.better(found, cell.grown(slots.folds, fewer))
+    return cell.judged(found, most)
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,6 +114,8 @@ class _Cell:
     """[W]"""
     distance: float
     """[m]"""
+    noise: float
+    """[W] of a receiver."""
 
     def sought(self, data: Complexes, h: int, method: str, count: int) -> Floats:
         """Return the cosines (k, 2) of at most `count` echoes folded h times in data (1, s * a)."""
@@ -178,7 +141,7 @@ class _Cell:
         rest = self._left(found.by_fold())
         beams = [self._channels(rest, h) for h in self.slots.folds]
         own = self.scan.aperture
-        return np.array([_amplitude(x, own, estimate(x, own, "bartlett", 1)) ** 2 for x in beams])
+        return np.array([np.abs(amplitudes(x, own, estimate(x, own, "bartlett", 1))[0, 0]) ** 2 for x in beams])
 
     def grown(self, folds: range, most: int) -> CellEchoes:
         """Return at most so many echoes of some folds: the strongest, and one more as long as they leave more than
@@ -193,6 +156,23 @@ class _Cell:
             if more is None or not self._clear_of_noise(more, found):
                 return found
             found = more
+
+    def judged(self, found: CellEchoes, most: int) -> CellEchoes:
+        """Return echoes, at most so many, of which what is left is explained, and which of their directions are open,
+        where sets of waves are sought together."""
+        own, folds = self.scan.aperture, found.by_fold()
+        if self.scan.method != "bartlett" or len(folds) > 1:
+            return found
+        ((h, at),) = folds.items()
+        misfit = self.scan.misfit(at, np.full(len(at), self.distance)) * len(own.elements)
+        judge = Judge(self._channels(self.data, h), own, self.noise, float(misfit @ found.power), self._told_apart)
+        if (towards := judge.better(at, most)) is not at:
+            found = self.told({h: towards})
+            found = replace(found, rest=float(self.beams_left(found).max()))
+        found = replace(found, open=judge.open(found.direction, bool(found.unsure(own).any())))
+        # Of waves that others need to be right those are given that are echoes.
+        clear = found.power > self._clear(found) * found.noise_gain
+        return found if towards is at or not clear.any() else found.take(clear)
 
     def _more(self, found: CellEchoes, other: int, most: int) -> CellEchoes | None:
         """Return one echo more than found, or two if all is explained by them: the best two waves of three echoes may
@@ -229,10 +209,13 @@ class _Cell:
             return None
         left = [self._energy(way) for way in ways]
         way = next(way for way, rest in zip(ways, left, strict=True) if rest <= min(left) + self._clear(found))
-        told = _TOLD_BY_PLANES if all(self.scan.aperture.scans) else _TOLD_BY_LINES
-        apart = told if self.scan.method == "bartlett" else _APART
-        near = any(_nearest(x, self.scan.aperture) < apart for x in way.values())
+        near = any(nearest(x, self.scan.aperture) < self._told_apart for x in way.values())
         return None if near else self.told(way)
+
+    @property
+    def _told_apart(self) -> float:
+        told = _TOLD_BY_PLANES if all(self.scan.aperture.scans) else _TOLD_BY_LINES
+        return told if self.scan.method == "bartlett" else _APART
 
     def _energy(self, directions: dict[int, Floats]) -> float:
         """Return the power in all channels of what echoes leave."""
@@ -269,14 +252,3 @@ class _Cell:
         """Return what the slots hold (k, s * a) of waves from directions by their folds."""
         held = [self.slots.waves(self.scan.aperture.steering(x), [h] * len(x)) for h, x in directions.items()]
         return np.concatenate(held)
-
-
-def _amplitude(data: Complexes, aperture: Aperture, direction: Floats) -> float:
-    """Return the amplitude of a wave from one direction (1, 2) in a snapshot (1, a)."""
-    return float(np.abs(amplitudes(data, aperture, direction)[0, 0]))
-
-
-def _nearest(directions: Floats, aperture: Aperture) -> float:
-    """Return the least distance of two directions (k, 2), in beam widths; infinite of one."""
-    apart = aperture.apart(directions[:, None], directions[None])
-    return float(apart[np.triu_indices(len(apart), 1)].min(initial=np.inf))

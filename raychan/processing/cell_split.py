@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.processing.angles import CellEchoes, Scan, echoes_in
+from raychan.processing.angles import Scan, echoes_in
+from raychan.processing.cell_echoes import CellEchoes
 from raychan.processing.cfar import Grid
 from raychan.processing.fold_beside import judged_beside
 from raychan.processing.found import Echoes, Peaks, Row
@@ -66,7 +67,8 @@ class Splitter:
             v, r = peaks.cells[i]
             fold, open_ = self._fold_beside(peaks, i, kept)
             snapshot, distance = self._read(v, r, self._spans(peaks, i, fold, v)), float(self.map.range[r])
-            held = echoes_in(snapshot, self.scan, float(peaks.least[i]), distance, self.slots)
+            noise = float(peaks.noise[i]) * self.receiver_noise
+            held = echoes_in(snapshot, self.scan, float(peaks.least[i]), distance, self.slots, noise)
             rows = [row for k in range(len(held.power)) if (row := self._placed(peaks, i, held, k, fold))]
             rows = [replace(row, unsure=row.unsure or open_ or self._bent(held, distance)) for row in rows]
             beside += [row for row in rows if row.beside]

@@ -163,6 +163,63 @@ def refine_beams(at, snapshots, beams, rounds, still):  # type: ignore[no-untype
             break
 
 
+@njit(cache=True, nogil=True)
+def _outside(own, basis, rest, snapshots, waves):  # type: ignore[no-untyped-def]
+    """Write orthonormal rows basis (k, a) that span waves (k, a) but for wave `own` (none if -1), 0 for one that the
+    others span, and what they leave of snapshots (n, a); return the power of that."""
+    total = 0.0
+    for j in range(len(waves)):
+        basis[j] = waves[j] * (0.0 if j == own else 1.0)
+        for m in range(j):
+            shared = 0j
+            for i in range(waves.shape[1]):
+                shared += basis[m, i].conjugate() * basis[j, i]
+            for i in range(waves.shape[1]):
+                basis[j, i] -= shared * basis[m, i]
+        size = 0.0
+        for i in range(waves.shape[1]):
+            size += basis[j, i].real ** 2 + basis[j, i].imag ** 2
+        for i in range(waves.shape[1]):
+            basis[j, i] = basis[j, i] / math.sqrt(size) if size > _RIDGE * waves.shape[1] else 0j
+    for n in range(len(snapshots)):
+        rest[n] = snapshots[n]
+        for j in range(len(waves)):
+            seen = 0j
+            for i in range(waves.shape[1]):
+                seen += basis[j, i].conjugate() * rest[n, i]
+            for i in range(waves.shape[1]):
+                rest[n, i] -= seen * basis[j, i]
+        for i in range(waves.shape[1]):
+            total += rest[n, i].real ** 2 + rest[n, i].imag ** 2
+    return total
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def refine_sets(at, left, snapshots, beams, rounds, still):  # type: ignore[no-untyped-def]
+    """Move the waves of sets at (s, k, 2) by turns, each to where it explains most of snapshots (n, a) beside the
+    others, until none moves by more than `still` (2,), but at most `rounds` times; write what sets leave, left (s,)."""
+    sets, count = at.shape[:2]
+    many = len(beams.places)
+    waves, basis = np.empty((count, many), np.complex128), np.empty((count, many), np.complex128)
+    wave, tried = np.empty(many, np.complex128), np.empty(2)
+    rest, before = np.empty_like(snapshots), np.empty((count, 2))
+    for s in range(sets):
+        for k in range(count):
+            _point(waves[k], beams.places, at[s, k, 0], at[s, k, 1])
+        for _ in range(rounds):
+            before[:] = at[s]
+            for k in range(count):
+                _outside(k, basis, rest, snapshots, waves)
+                _climb(at[s, k], rest, basis, beams, wave, tried)
+                _point(waves[k], beams.places, at[s, k, 0], at[s, k, 1])
+            moved = False
+            for k in range(count):
+                moved |= abs(at[s, k, 0] - before[k, 0]) >= still[0] or abs(at[s, k, 1] - before[k, 1]) >= still[1]
+            if not moved:
+                break
+        left[s] = _outside(-1, basis, rest, snapshots, waves)
+
+
 def snapshots_for(data: NDArray[Any]) -> NDArray[np.complex128]:
     """Return snapshots (n, a) as kernels take them."""
     return np.ascontiguousarray(data, np.complex128)

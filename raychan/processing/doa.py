@@ -15,6 +15,7 @@ from raychan.processing.covariance import Covariance, covariance
 from raychan.processing.esprit import esprit
 from raychan.processing.joint_search import joint
 from raychan.processing.monopulse import monopulse
+from raychan.processing.rivals import searched
 from raychan.processing.source_number import source_number
 from raychan.processing.spectra import BEAMS_PER_BEAM, Bartlett, beams_of, capon, climb, music, peaks, squared
 from raychan.processing.twins import ambiguous, nearer, nearest_boresight
@@ -34,9 +35,6 @@ _EVEN = 1.0
 """Times the noise: beams whose powers differ by less leave open which is the echo's. Of 600 lone echoes before lines
 and squares that elements stand off by up to 0.1 wavelengths 519 are right with 1, 475 with 12, 530 with 0, which gives
 of equal ones any."""
-_FEW = 4
-"""Elements to an echo: side lobes of smaller rectangles are high, too. Of 40 threes before 3 x 3, a beam width or more
-apart, 3 are wrong without, none with."""
 _COUNTING = 0.5  # rows of a sub-array over the array's for counting echoes in few snapshots: MDL needs more of them
 
 
@@ -173,7 +171,6 @@ def by_turns(data: Complexes, aperture: Aperture, count: int) -> Floats:
         found = np.concatenate([found, peaks(Bartlett(rest), aperture, 1, BEAMS_PER_BEAM)])
         if k > 0:
             refine_beams(found, held, beams, _ROUNDS, _STILL * width)
-    few = all(aperture.scans) and len(aperture.elements) <= _FEW * count
-    if count > 1 and (few or aperture.table is None):
+    if count > 1 and searched(aperture, count):
         found = joint(data, aperture, found)
     return aperture.canonical(found)
