@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.radar.waveform import OwnWaveform
 from raychan.world.errors import SceneError
 from raychan.world.scene import Scene
 
@@ -69,6 +70,7 @@ def check_often(scene: Scene, retrace: str | int) -> None:
         "staggered repetition (radar.waveform.stagger_us)": bool(radar.waveform.stagger),
         'receivers of both polarisations (radar.rx_polarization = "both")': radar.rx_polarization == "both",
         "receivers elsewhere (radar.rx_position)": radar.rx_position is not None,
+        "a waveform of one's own (a subclass of Waveform)": isinstance(radar.waveform, OwnWaveform),
     }
     moves = "turn" if retrace == "auto" else "move or turn relative to the radar"
     for what in (name for name, given in refused.items() if given):

@@ -1,5 +1,7 @@
 """Of which time in the frame range, rate and azimuth of a detection are, as docs/conventions.md has it."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 
@@ -64,3 +66,25 @@ def test_a_frame_that_is_traced_once_only_is_refused_by_its_key(tmp_path, capsys
     assert invoke(["run", str(file), "--out", str(tmp_path / "out")]) == 2
     said = capsys.readouterr().err
     assert "model.retrace" in said and "Traceback" not in said and not (tmp_path / "out").exists()
+
+
+@dataclass(frozen=True)
+class Silent(rc.Waveform):
+    """A waveform of one's own of which no echo is heard."""
+
+    def received(self, amplitude, delay, delay_rate):
+        return np.zeros((self.n_chirps, self.n_samples), complex)
+
+    def compressed(self, samples):
+        return samples
+
+
+def test_a_waveform_of_ones_own_is_refused_where_frames_take_several_tracings():
+    wave = Silent(carrier=77e9, bandwidth=3e8, chirp_duration=3e-5, repetition=4e-5, n_chirps=512, n_samples=64)
+    box = rc.Body("box", shape="box", position=(*POST, 0.5), turn_rate_dps=400.0)
+    radar = rc.Radar(wave, position=(0.0, 0.0, 0.5))
+    with pytest.raises(rc.SceneError, match="waveform of one's own") as refused:
+        rc.simulate(rc.Scene([box], radar=radar, model={"max_bounces": 1}))
+    assert refused.value.key == "model.retrace"
+    once = rc.simulate(rc.Scene([box], radar=radar, model={"max_bounces": 1, "retrace": 1}))
+    assert len(once.detections.range) == 0
