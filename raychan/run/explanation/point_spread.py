@@ -109,7 +109,7 @@ class PointSpread:
     def in_cells(
         self, group: NDArray[np.int64], count: int, amplitude: Complexes, delay: Floats, rate: Floats, cells: Floats
     ) -> Sums:
-        """Return the contributions of paths (n,) to map cells, summed by groups: see run.cell_sums.cell_sums.
+        """Return the contributions of paths (n,) to map cells, summed by groups: see `cell_sums.cell_sums`.
 
         Args: group (n,) of each path, below `count`; cells (c, 3), each range [m], rate [m/s] and amplitude, to 1e-3 of
         which the sum over all paths is exact; else as for `in_cell`.

@@ -39,7 +39,7 @@ _WEAK = 4.0  # times the noise's amplitude: what else weak ones are off by
 _BOUNCES = 3  # over the ground, to a body, and over the ground
 _TOLERANCE_DB = 1.0  # for which tubes are cut: the limits on their phase grow no further (tracing.settings)
 _LEVEL = 1e-4  # of the sum of all amplitudes: error of the samples
-# They trade tubes against levels that pruned tubes change, by sums as `preview_launch.that_count` counts them. With all
+# They trade tubes against levels that pruned tubes change, by sums as `launch.that_count` counts them. With all
 # sums in phase, cells of direct echoes were off by 0.7 dB (rms), 2 dB at most, beside fine runs of the living street;
 # at floor 10 by 1.1 and 5.7 dB for 8 % less time of tracing, at relative 8 by 0.8 and 4 dB for 6 % (command not noted).
 _FLOOR = 6.7  # of the noise-equivalent amplitude: pruned tubes of a range cell add up to 0.3 of that

@@ -18,7 +18,7 @@ _LEAST = 1_000_000
 """Rays that further launches may cast however few the first one did."""
 _FINEST = 1.0
 """Tolerance [dB] from which down both grow as it shrinks: doubts shrink by 0.65 a step of 1.6 times the rays of the one
-before (`map_cells`, `refinement_plan`), so rays grow at least so. At 0.5 dB urban, living street and occluded
+before (`map_cells`, `plan`), so rays grow at least so. At 0.5 dB urban, living street and occluded
 pedestrian take 3.0, 2.2 and 2.8 million rays in place of 2.0, 1.0 and 1.6, 1.5 times the CPU, and bring 27 of 31
 detections within it in place of 22 of 30. At 2 dB half of the rays lose one of 30, at 1 dB twice as many bring none."""
 _BYTES = 900.0  # a path, at the peak of a run (of 1.5 and 5.4 million 890 and 910)
