@@ -217,7 +217,6 @@ def _array(c: dict[str, Any], path: Path) -> Path:
         yscale="log",
         xlabel="distance over 2 D² / wavelength",
         ylabel="greatest phase error [rad]",
-        ylim=(0.01, 1.5),
     )
     axes.set_title("A target in the near field of a receiving array")
     axes.legend()

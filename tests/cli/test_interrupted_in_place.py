@@ -19,7 +19,6 @@ COMMANDS = {
     "run": (["run", "plate.toml", "--no-pictures", "--out", "{out}"], "the results are in {out}"),
     "frames": (FRAMES, "1 of 2 frames is in {out}"),
     "ship": (["ship", "ship.toml", "--no-pictures", "--out", "{out}"], "the results are in {out}"),
-    "sweep": (["study", "sweep", "plate.toml", "--target", "sign", "--out", "{out}"], "the results are in {out}"),
     "spectrogram": (
         ["spectrogram", "plate.toml", "--seconds", "0.01", "--resolution", "0.5", "--out", "{out}"],
         "written: {out}/spectrogram.nc, {out}/spectrogram.png",

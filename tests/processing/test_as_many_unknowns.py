@@ -12,7 +12,7 @@ from raychan.radar.aperture import Aperture
 NOISE = 1e-5
 
 
-@pytest.mark.parametrize(("rows", "columns", "most", "draws"), [(2, 2, 2, 60), (2, 3, 3, 30), (3, 3, 4, 12)])
+@pytest.mark.parametrize(("rows", "columns", "most", "draws"), [(2, 2, 2, 40), (2, 3, 3, 20), (3, 3, 4, 6)])
 def test_echoes_that_have_as_many_unknowns_as_an_array_has_data_are_unsure(rows, columns, most, draws):
     aperture = Aperture(plane(rows, columns), 1.0)
     scan, size, seen = Scan(aperture, "bartlett", 1e3), rows * columns, set()

@@ -264,8 +264,10 @@ def peak_near(m, place):
 
 
 @pytest.mark.parametrize("known", [True, False])
-@pytest.mark.parametrize("pad", [(1, 1), (2, 2)])
-@pytest.mark.parametrize(("method", "min_snr_db"), [("os", 20.0), ("ca", 20.0), ("os", 5.0), ("ca", 5.0)])
+@pytest.mark.parametrize(
+    ("method", "min_snr_db", "pad"),
+    [("os", 20.0, (1, 1)), ("ca", 20.0, (2, 2)), ("os", 5.0, (2, 2)), ("ca", 5.0, (1, 1))],
+)
 def test_a_lone_echo_is_detected_exactly_from_the_least_power_of_its_cell_on(method, min_snr_db, pad, known):
     settings, said = {"method": method, "min_snr_db": min_snr_db, "pfa": 1e-6}, []
     for k, amplitude in enumerate(np.geomspace(3e-8, 5e-7, 60)):

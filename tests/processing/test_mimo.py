@@ -39,7 +39,7 @@ def found(radar, paths, seed=None, settings=SETTINGS):
 @pytest.mark.parametrize("multiplexing", ["tdm", "ddm"])
 @pytest.mark.parametrize(
     ("rate", "azimuth_deg"),
-    [(-20.0, -40.0), (-20.0, 12.5), (0.0, 55.0), (5.3, -3.0), (20.0, -40.0), (20.0, 55.0), (33.0, -3.0), (33.0, 12.5)],
+    [(-20.0, 12.5), (0.0, 55.0), (20.0, -40.0), (33.0, -3.0)],
 )
 def test_azimuth_and_rate_of_a_mover_are_its_own(multiplexing, rate, azimuth_deg):
     """20 m/s fold and turn the phase by 0.2 turns from transmitter to transmitter: still within 0.5 deg."""

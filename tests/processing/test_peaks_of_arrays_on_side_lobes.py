@@ -32,7 +32,7 @@ def seen(array, sampling, sent, name, pad):
     return detections_in(map_of(synthesize(paths, radar), radar, settings), radar, settings), wave
 
 
-@pytest.mark.parametrize(("name", "away"), [("rect", 3.32), ("rect", 7.83), ("hann", 6.09), ("hamming", 5.45)])
+@pytest.mark.parametrize(("name", "away"), [("rect", 7.83), ("hann", 6.09)])
 @pytest.mark.parametrize("sampling", ["I/Q", "real"])
 @pytest.mark.parametrize("array", ARRAYS)
 def test_an_echo_on_a_side_lobe_reads_what_a_map_of_finer_cells_shows(array, sampling, name, away):

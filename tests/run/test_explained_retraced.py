@@ -27,8 +27,7 @@ def run(division: str, *, receivers: int = 8, iq: bool = True, beams: str = "coh
     return rc.simulate(rc.Scene([body], radar=radar, model={"max_bounces": 1, "retrace": 9}))
 
 
-@pytest.mark.parametrize("speed", [9.0, -26.0])
-@pytest.mark.parametrize("iq", [True, False])
+@pytest.mark.parametrize(("speed", "iq"), [(9.0, True), (-26.0, False)])
 @pytest.mark.parametrize("division", ["none", "tdm", "ddm"])
 def test_what_paths_give_is_the_level_at_the_peak_in_the_beam(division, iq, speed):
     """In the map cell alone it was 0.2 dB low, by Doppler division 3 dB, with only a share of the slots."""

@@ -56,9 +56,7 @@ def test_half_a_mirror_point_under_twice_the_gain_returns_what_a_whole_one_does(
     assert off <= (found.error_db[i] + whole.error_db[k] if "mode" not in model else 1.0)
 
 
-@pytest.mark.parametrize(
-    ("body", "radius", "carrier"), [("cylinder", 0.197, 24e9), ("sphere", 0.1, 77e9), ("sphere", 0.121, 24e9)]
-)
+@pytest.mark.parametrize(("body", "radius", "carrier"), [("cylinder", 0.197, 24e9), ("sphere", 0.1, 77e9)])
 def test_levels_of_curved_bodies_partly_behind_the_plane_are_within_what_is_stated(body, radius, carrier):
     """Facets bulge over the straight lines between their corners: corners of cuts by these lay behind the plane, where
     there is no field, or before it."""

@@ -35,7 +35,7 @@ def theta_phi_of(look):
     return np.stack(theta_phi(look), axis=1).astype(complex)
 
 
-@pytest.mark.parametrize(("azimuth_deg", "most"), [(37.0, 1.0), (100.0, 2.0), (171.0, 1.0)])
+@pytest.mark.parametrize(("azimuth_deg", "most"), [(37.0, 1.0), (100.0, 2.0)])
 def test_range_profile_of_a_car_is_that_of_a_finer_launch_over_another_lattice(azimuth_deg, most):
     """Cells within 30 dB of the peak within 1 dB rms (2 dB where least returns), by a million rays, 15 m away, 3
     bounces. At 37 degrees it is 1.000 million from either side; 0.99 and 1.01 when both were cut into facets unlike."""
