@@ -4,7 +4,7 @@ error."""
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +15,25 @@ from raychan.channel.drifts import drifts
 from raychan.radar.array import Wavefronts, wavefronts
 from raychan.radar.radar import Radar
 from raychan.records import SCATTER, Cube, DiffractedRoutes, Facets, Paths, Routes
+from raychan.signal.phase_error import Delays, Oscillator
 from raychan.units import C0
 from raychan.world.scene import Scene
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 Samples = NDArray[np.complexfloating[Any, Any]]
+
+
+class UnderPhaseErrors(Protocol):
+    """The part of a frame's samples that comes from turning bodies, under phase errors."""
+
+    def beside(self, delays: Delays) -> Delays:
+        """Return delays of other echoes of the frame, with those of its own."""
+        ...
+
+    def samples(self, oscillator: Oscillator) -> Samples:
+        """Return the samples (antenna, chirp, sample) as an oscillator turns them."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -40,6 +53,8 @@ class Retraced:
     rays: int
     reached: bool
     """Whether the error is under the tolerance."""
+    again: UnderPhaseErrors | None = None
+    """What makes the turning part again under phase errors, where the radar has any."""
 
     @property
     def cube(self) -> Cube:
