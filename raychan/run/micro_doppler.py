@@ -141,12 +141,18 @@ class _Frame:
         samples, error = joined([s.blend() for s in segments]), joined([s.error() for s in segments])
         if not self.radar.waveform.complex_sampling:
             samples, error = samples.real.astype(complex), error.real.astype(complex)
-        times, turned = tuple(sorted(self.times)), None
-        if self.radar.impairments.phase_errors:
-            keys = segments[0].start, *(s.end for s in segments)
-            turned = MadeAgain(keys, self.carried)
-        whole, off = samples.sum(axis=0), error.sum(axis=0)
-        return Retraced(whole, samples[0], self.turns, off, times, self.rays, self.reached, turned)
+        keys = segments[0].start, *(s.end for s in segments)
+        return Retraced(
+            samples=samples.sum(axis=0),
+            turning=samples[0],
+            turns=self.turns,
+            error=error.sum(axis=0),
+            times=tuple(sorted(self.times)),
+            rays=self.rays,
+            reached=self.reached,
+            again=MadeAgain(keys, self.carried) if self.radar.impairments.phase_errors else None,
+            tracings=tuple((key.paths, (key.chirp - key.since) * self.step) for key in keys),
+        )
 
     def keyframe(self, chirp: int, known: Traced | None = None) -> Keyframe:
         """Return the keyframe at a chirp, traced unless the tracing is known."""
@@ -174,6 +180,7 @@ class _Frame:
             tuple(strengths(r, geometry.facets, now.radar, wave.middle) for r in routes),
             tuple(PartFronts.of(r, geometry.facets, now.radar) for r in routes),
             take(known.paths, rest[known.paths.trajectory]),
+            known.paths,
             since,
         )
 

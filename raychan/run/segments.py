@@ -55,6 +55,8 @@ class Retraced:
     """Whether the error is under the tolerance."""
     again: UnderPhaseErrors | None = None
     """What makes the turning part again under phase errors, where the radar has any."""
+    tracings: tuple[tuple[Paths, float], ...] = ()
+    """Paths of each tracing, and how long [s] after the instant to which their delays refer it was made."""
 
     @property
     def cube(self) -> Cube:
@@ -122,8 +124,8 @@ def _parts(corners: Floats, whole: Floats, split: NDArray[np.bool_]) -> Floats:
 
 @dataclass(frozen=True)
 class Keyframe:
-    """One tracing at a chirp: the routes that meet turning bodies, with their strengths and waves, and the other
-    paths."""
+    """One tracing at a chirp: the routes that meet turning bodies, with their strengths and waves, the other paths, and
+    all paths."""
 
     chirp: int
     scene: Scene
@@ -131,8 +133,9 @@ class Keyframe:
     strengths: tuple[Complexes, ...]
     fronts: tuple[PartFronts, ...]
     others: Paths
+    paths: Paths
     since: int
-    """The chirp to whose start the delays and phases of the other paths refer."""
+    """The chirp to whose start the delays and phases of paths refer."""
 
 
 def reach(chirps: int) -> int:

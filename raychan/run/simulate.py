@@ -187,7 +187,7 @@ def _explained(
     if turned:
         left_out["intra-frame motion"] = motion(turned)
         left_out[WIDE] = before_wide_arrays(paths, turned.turns, radar, settings, weakest)
-        reasons = claimed(reasons, paths, turned, error.power, found, receiver, radar, settings)
+        reasons = claimed(reasons, paths, turned, detected, receiver, radar, settings)
     return all_named(reasons, found, no_echo), left_out
 
 
