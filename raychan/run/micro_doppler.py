@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterator
-from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -17,30 +16,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.paths import join
-from raychan.channel.slow_time import Poses, strengths
+from raychan.channel.slow_time import strengths
 from raychan.columns import take
-from raychan.radar.array import Transmission
 from raychan.radar.radar import Radar
 from raychan.records import DIFFRACT, Paths, Routes
-from raychan.run.between_chirps import carried_between
-from raychan.run.segments import Keyframe, PartFronts, Retraced, Segment, Traced, echoes, joined, reach
+from raychan.run.carried_ramps import CarriedRamps, MadeAgain
+from raychan.run.segments import Keyframe, PartFronts, Retraced, Segment, Traced, joined, reach
 from raychan.run.solver import Batch, solve_into
 from raychan.run.turning import carried_on, middle_chirp
-from raychan.signal.baseband import synthesize
-from raychan.signal.dechirp import ramp_sums
 from raychan.tracing.settings import PruneRule
-from raychan.units import C0
 from raychan.world.geometry import geometry_of, surface_at
 from raychan.world.scene import Scene
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 Samples = NDArray[np.complexfloating[Any, Any]]
 
 # Trade time against error; single values not measured.
 _CHIRPS = 48  # least chirps per keyframe: bounds the number of tracings
-_AT_ONCE = 64  # chirps whose routes are held in memory at once
-_FEW = 3_000_000  # samples times parts of routes up to which the plain sum is faster than a transform
 _HELPS = 0.5  # of the error power before: a keyframe that leaves more is the last one in its segment
 _BETWEEN = 0.6e-3
 """From one computed pose to the next in a spectrogram [s]: a walker's samples are then off by -117 dB (0.3 ms:
@@ -77,7 +68,7 @@ def stretches(
     begins with the chirp after the last one of the part before.
     """
     work = _Frame(scene, rule, model.model_copy(update={"retrace": count}), progress)
-    work.most, work.every = count, max(1.0, _BETWEEN / work.step)
+    work.most, work.carried.every = count, max(1.0, _BETWEEN / work.step)
     at = np.unique(np.rint(np.linspace(0, scene.radar.waveform.n_chirps - 1, count)).astype(int))
     before = work.keyframe(int(at[0]))
     for chirp in at[1:]:
@@ -96,7 +87,7 @@ class _Frame:
         self.radar: Radar = dataclasses.replace(scene.radar, noise=False)
         wave = self.radar.waveform
         self.chirps, self.step = wave.n_chirps, wave.repetition
-        self.every = 1.0  # chirps from one computed pose to the next
+        self.carried = CarriedRamps(self.radar, self.turns)
         self.rays, self.times = 0, list[float]()
         self.most = max(3, 1 + self.chirps // _CHIRPS)
         self.reached = True
@@ -123,7 +114,7 @@ class _Frame:
         start, end = segment.start, segment.end
         key = self.keyframe((start.chirp + end.chirp) // 2)
         left, right = reach(key.chirp - start.chirp), reach(end.chirp - key.chirp)
-        c = self.extrapolated(key, key.chirp - left, key.chirp + right)
+        c = self.carried.both(key, key.chirp - left, key.chirp + right)
         return (
             Segment(start, key, segment.a[:, :, : left + 1], c[:, :, : left + 1]),
             Segment(key, end, c[:, :, left:], segment.b[:, :, -right - 1 :]),
@@ -142,16 +133,26 @@ class _Frame:
     def segment(self, start: Keyframe, end: Keyframe) -> Segment:
         """Return the segment between two keyframes."""
         far = reach(end.chirp - start.chirp)
-        a = self.extrapolated(start, start.chirp, start.chirp + far)
-        return Segment(start, end, a, self.extrapolated(end, end.chirp - far, end.chirp))
+        a = self.carried.both(start, start.chirp, start.chirp + far)
+        return Segment(start, end, a, self.carried.both(end, end.chirp - far, end.chirp))
 
     def done(self, segments: list[Segment]) -> Retraced:
         """Return the frame of segments in order."""
         samples, error = joined([s.blend() for s in segments]), joined([s.error() for s in segments])
         if not self.radar.waveform.complex_sampling:
             samples, error = samples.real.astype(complex), error.real.astype(complex)
-        times = tuple(sorted(self.times))
-        return Retraced(samples.sum(axis=0), samples[0], self.turns, error.sum(axis=0), times, self.rays, self.reached)
+        keys = segments[0].start, *(s.end for s in segments)
+        return Retraced(
+            samples=samples.sum(axis=0),
+            turning=samples[0],
+            turns=self.turns,
+            error=error.sum(axis=0),
+            times=tuple(sorted(self.times)),
+            rays=self.rays,
+            reached=self.reached,
+            again=MadeAgain(keys, self.carried) if self.radar.impairments.phase_errors else None,
+            tracings=tuple((key.paths, (key.chirp - key.since) * self.step) for key in keys),
+        )
 
     def keyframe(self, chirp: int, known: Traced | None = None) -> Keyframe:
         """Return the keyframe at a chirp, traced unless the tracing is known."""
@@ -179,109 +180,13 @@ class _Frame:
             tuple(strengths(r, geometry.facets, now.radar, wave.middle) for r in routes),
             tuple(PartFronts.of(r, geometry.facets, now.radar) for r in routes),
             take(known.paths, rest[known.paths.trajectory]),
+            known.paths,
             since,
         )
 
     def touches(self, body: NDArray[np.signedinteger], kind: NDArray[np.signedinteger]) -> NDArray[np.bool_]:
         """Return which sequences of interactions (n, d) meet a turning body."""
         return np.asarray((self.turns[np.maximum(body, 0)] & (kind > 0)).any(axis=1))
-
-    def extrapolated(self, key: Keyframe, first: int, last: int) -> Samples:
-        """Return the samples (2, antenna, chirp, sample) of a keyframe's paths extrapolated to chirps first to last: of
-        those that meet turning bodies, and of all others."""
-        wave = self.radar.waveform
-        shape = (2, len(self.radar.elements), last - first + 1, wave.n_samples)
-        out = np.zeros(shape, np.complex64)
-        delay_rate = key.others.length_rate / C0 * (first - key.since) * self.step
-        way = key.others.trajectories
-        late = key.others.replace(
-            length=key.others.length + C0 * delay_rate,
-            amplitude=key.others.amplitude * np.exp(-2j * np.pi * wave.carrier * delay_rate),
-            trajectories=way.replace(instant=way.instant + (key.since - first) * self.step),
-        )
-        frame = dataclasses.replace(wave, n_chirps=last - first + 1)
-        out[1] = synthesize(late, dataclasses.replace(self.radar, waveform=frame), first=first).samples
-        for routes, strength, fronts in zip(key.routes, key.strengths, key.fronts, strict=True):
-            for start in range(first, last + 1, _AT_ONCE):
-                count = min(_AT_ONCE, last + 1 - start)
-                # One instant more than chirps: the rate is the change from chirp to chirp.
-                at = np.arange(start, start + count + 1, dtype=float)
-                lengths, amplitudes = carried_between(
-                    routes, strength, partial(self.poses, key), at, self.every, wave.middle
-                )
-                # Phases are those of the carrier, from where the ramp begins.
-                amplitudes *= np.exp(2j * np.pi * wave.swept / C0 * lengths)
-                rows = out[0, :, start - first : start - first + count]
-                for sent in self.radar.transmissions:
-                    self.add_ramps(rows, (start, at - key.chirp), sent, lengths, amplitudes, fronts)
-        return out
-
-    def add_ramps(
-        self,
-        out: Samples,
-        begin: tuple[int, Floats],
-        sent: Transmission,
-        lengths: Floats,
-        amplitudes: Complexes,
-        fronts: PartFronts,
-    ) -> None:
-        """Add to samples (antenna, chirp, sample) what one transmitter brings over parts (chirp + 1, n, 3) of routes of
-        these lengths [m]. Args: begin, the number of the first chirp, and by how many chirps all come after the
-        keyframe (chirp + 1,)."""
-        (start, after), wave = begin, self.radar.waveform
-        chirps, late = slice(sent.since(start).first, None, sent.step), self.step * after[:, None, None]
-        code = np.exp(2j * np.pi * (sent.turn * (start + np.arange(out.shape[1])[chirps]) % 1.0))[:, None]
-        split = np.asarray((amplitudes[:, :, 1:] != 0.0).any(axis=(0, 2)))
-        for layer, element in zip(out, self.radar.elements_world, strict=True):
-            longer, factor = fronts.between(sent.offset, element, split)
-            if fronts.drifting:
-                longer = longer + late * fronts.faster(sent.offset, element, split)
-            turn = np.sqrt(self.radar.power) * factor * np.exp(-2j * np.pi / wave.wavelength * longer)
-            brought = self.ramps(lengths + longer, amplitudes * turn, chirps)
-            layer[chirps] += brought if sent.turn == 0.0 else brought * code
-
-    def ramps(self, lengths: Floats, amplitudes: Complexes, chirps: slice) -> Samples:
-        """Return the samples (chirp, sample) of some chirps, of parts (chirp + 1, n, 3) of routes with these lengths
-        [m]."""
-        wave, count = self.radar.waveform, len(lengths) - 1
-        parts = np.flatnonzero((amplitudes != 0.0).any(axis=0))
-        length = lengths.reshape(count + 1, -1)[:, parts]
-        delay = length / C0
-        delay_rate, delay = (np.diff(delay, axis=0) / self.step)[chirps], delay[:-1][chirps]
-        strength = np.ascontiguousarray(amplitudes.reshape(count + 1, -1)[:-1, parts][chirps])
-        length, delay = length[:-1][chirps], np.ascontiguousarray(delay)
-        delay_rate = np.ascontiguousarray(delay_rate)
-        if not len(delay):
-            return np.zeros((0, wave.n_samples), np.complex128)
-        if len(parts) * wave.n_samples <= _FEW:
-            step = wave.chirp_duration / wave.n_samples
-            rows = ramp_sums(strength, delay, delay_rate, wave.carrier, wave.slope, step, wave.n_samples)
-            return np.asarray(rows)
-        here = np.zeros(3)
-        single: dict[str, Any] = {"elements": here[None], "tx_elements": here[None], "multiplexing": "none"}
-        single |= {"ddm_slots": None, "waveform": dataclasses.replace(wave, n_chirps=1)}
-        one = dataclasses.replace(self.radar, **single, power=1.0)
-        return np.stack(
-            [
-                synthesize(echoes(*row, here), one).samples[0, 0]
-                for row in zip(length, strength, delay_rate, strict=True)
-            ]
-        )
-
-    def poses(self, key: Keyframe, chirps: Floats) -> Poses:
-        """Return the poses of bodies and radar at chirps, relative to a keyframe."""
-        late = (chirps - key.chirp) * self.step
-        motions, radar = [b.motion for b in key.scene.bodies], key.scene.radar
-        turn = np.broadcast_to(np.eye(3), (len(late), len(motions), 3, 3)).copy()
-        for b in np.flatnonzero(self.turns):
-            turn[:, b] = motions[b].poses(late)[0] @ motions[b].rotation().T
-        origin = np.array([m.origin() for m in motions])
-        return Poses(
-            origin=origin,
-            turn=turn,
-            place=np.stack([m.poses(late)[1] for m in motions], axis=1),
-            radar=radar.position + late[:, None] * radar.velocity,
-        )
 
 
 def _worth(segment: Segment, error: float, before: float, limit: float) -> bool:

@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 from raychan.radar.radar import Radar
 from raychan.records import Cube, Paths
 from raychan.run.rounding import Rounding, rounding_of
+from raychan.run.segments import Retraced
 from raychan.run.streams import Stage, stream
 from raychan.signal.baseband import noisy, synthesize
 from raychan.signal.converter import digitized
-from raychan.signal.phase_error import faulty
+from raychan.signal.phase_error import Delays, Oscillator, faulty
 
 
 def received(
@@ -22,17 +23,24 @@ def received(
     seed: int,
     interference: NDArray[np.complex128] | None = None,
     clean: Cube | None = None,
+    turned: Retraced | None = None,
 ) -> tuple[Cube, list[str], Rounding | None]:
     """Return what the radar's receiver records, what a user should know of it, and what its converter may spoil.
 
     Args: quiet, the samples without noise or impairments; paths, of which they are the sum, as far as phase errors
     apply to them; seed; interference, samples (a, c, s) that other radars add; clean, the samples of `paths` without
-    impairments where they are known (`quiet` itself, where it has nothing else).
+    impairments where they are known (`quiet` itself, where it has nothing else); turned, a frame traced several times,
+    whose turning part is turned beside the paths.
     """
     cube = quiet
     if radar.impairments.phase_errors:
         clean = clean or synthesize(paths, radar)
-        errors = faulty(paths, radar, stream(seed, Stage.PHASE_NOISE)).samples - clean.samples
+        delays, again = Delays.of(paths, radar.waveform), turned and turned.again
+        # One oscillator for all: its draw is long enough for every delay.
+        by = Oscillator.of(radar, again.beside(delays) if again else delays, stream(seed, Stage.PHASE_NOISE))
+        errors = faulty(paths, radar, by).samples - clean.samples
+        if turned and again:
+            errors = errors + (again.samples(by) - turned.turning).astype(np.complex64)
         cube = Cube(samples=quiet.samples + errors, noise_power=0.0)
     if interference is not None:
         cube = Cube(samples=(cube.samples + interference).astype(np.complex64), noise_power=0.0)
@@ -52,9 +60,8 @@ def clipping(clipped: int, count: int) -> list[str]:
     ]
 
 
-def notes(radar: Radar, whole: bool, turning: bool) -> list[str]:
-    """Return what phase errors leave out: paths that are too many to keep, and bodies that turn."""
-    if not radar.impairments.phase_errors:
+def notes(radar: Radar, whole: bool) -> list[str]:
+    """Return what phase errors leave out: paths that are too many to keep."""
+    if whole or not radar.impairments.phase_errors:
         return []
-    said = [] if whole else ["chirp error and phase noise are those of the strongest paths only, which are kept"]
-    return said + (["returns of bodies that turn are without chirp error and phase noise"] if turning else [])
+    return ["chirp error and phase noise are those of the strongest paths only, which are kept"]

@@ -4,7 +4,7 @@ error."""
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +15,25 @@ from raychan.channel.drifts import drifts
 from raychan.radar.array import Wavefronts, wavefronts
 from raychan.radar.radar import Radar
 from raychan.records import SCATTER, Cube, DiffractedRoutes, Facets, Paths, Routes
+from raychan.signal.phase_error import Delays, Oscillator
 from raychan.units import C0
 from raychan.world.scene import Scene
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 Samples = NDArray[np.complexfloating[Any, Any]]
+
+
+class UnderPhaseErrors(Protocol):
+    """The part of a frame's samples that comes from turning bodies, under phase errors."""
+
+    def beside(self, delays: Delays) -> Delays:
+        """Return delays of other echoes of the frame, with those of its own."""
+        ...
+
+    def samples(self, oscillator: Oscillator) -> Samples:
+        """Return the samples (antenna, chirp, sample) as an oscillator turns them."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -40,6 +53,10 @@ class Retraced:
     rays: int
     reached: bool
     """Whether the error is under the tolerance."""
+    again: UnderPhaseErrors | None = None
+    """What makes the turning part again under phase errors, where the radar has any."""
+    tracings: tuple[tuple[Paths, float], ...] = ()
+    """Paths of each tracing, and how long [s] after the instant to which their delays refer it was made."""
 
     @property
     def cube(self) -> Cube:
@@ -107,8 +124,8 @@ def _parts(corners: Floats, whole: Floats, split: NDArray[np.bool_]) -> Floats:
 
 @dataclass(frozen=True)
 class Keyframe:
-    """One tracing at a chirp: the routes that meet turning bodies, with their strengths and waves, and the other
-    paths."""
+    """One tracing at a chirp: the routes that meet turning bodies, with their strengths and waves, the other paths, and
+    all paths."""
 
     chirp: int
     scene: Scene
@@ -116,8 +133,9 @@ class Keyframe:
     strengths: tuple[Complexes, ...]
     fronts: tuple[PartFronts, ...]
     others: Paths
+    paths: Paths
     since: int
-    """The chirp to whose start the delays and phases of the other paths refer."""
+    """The chirp to whose start the delays and phases of paths refer."""
 
 
 def reach(chirps: int) -> int:

@@ -149,8 +149,8 @@ def _received(
     # Without turning bodies, fluctuation, clutter or sums in batches the quiet samples are those of the paths.
     clean = quiet if turned is None and launched.whole and quiet is channel.quiet else None
     sent = np.sum([*others.values()], axis=0) if others else None
-    cube, said, rounding = received(quiet, paths, scene.radar, seed, sent, clean)
-    return cube, said + notes(scene.radar, launched.whole, turned is not None) + never_heard(scene), rounding
+    cube, said, rounding = received(quiet, paths, scene.radar, seed, sent, clean, turned)
+    return cube, said + notes(scene.radar, launched.whole) + never_heard(scene), rounding
 
 
 def _detected(scene: Scene, channel: Channel, cube: Cube) -> Detected:
@@ -187,7 +187,7 @@ def _explained(
     if turned:
         left_out["intra-frame motion"] = motion(turned)
         left_out[WIDE] = before_wide_arrays(paths, turned.turns, radar, settings, weakest)
-        reasons = claimed(reasons, paths, turned, error.power, found, receiver, radar, settings)
+        reasons = claimed(reasons, paths, turned, detected, receiver, radar, settings)
     return all_named(reasons, found, no_echo), left_out
 
 

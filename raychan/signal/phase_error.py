@@ -12,7 +12,8 @@ interpolated between the four nearest groups (Lagrange), which for a part of phi
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -97,11 +98,10 @@ class PhaseTrack:
         weights = lagrange(place - row)
         return np.asarray(sum(w * self.phase[row + i - 1] for i, w in enumerate(weights)))
 
-    def turn(self, delay: float) -> Complexes:
-        """Return exp(j [phi(t - delay) - phi(t)]) in all samples (chirps, samples) of a frame; delay [s]."""
-        chirps = starts(self.wave)
-        if self.phase is None:
-            chirps = chirps[:1]
+    def turn(self, delay: float, some: slice = slice(None)) -> Complexes:
+        """Return exp(j [phi(t - delay) - phi(t)]) in all samples (chirps, samples) of a frame, or of some chirps;
+        delay [s]. Without phase noise one chirp stands for all."""
+        chirps = starts(self.wave)[slice(1) if self.phase is None else some]
         return np.asarray(np.exp(1j * (self.at(chirps, delay) - self.at(chirps, 0.0))))
 
 
@@ -120,33 +120,95 @@ def lagrange(u: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     )
 
 
-def faulty(paths: Paths, radar: Radar, rng: np.random.Generator, method: str = "auto") -> Cube:
+@dataclass(frozen=True)
+class Delays:
+    """Delays [s] of the echoes of a frame: from `least` to `most` at its middle, within it by `drift` more to both
+    sides, and up to `latest` at its start."""
+
+    least: float
+    most: float
+    drift: float
+    latest: float
+
+    @staticmethod
+    def of(paths: Paths, wave: Waveform) -> Delays:
+        """Return those of paths; with zero, which is always among them."""
+        middle, latest = _middle(paths, wave), float(paths.delay.max(initial=0.0))
+        drift = float(np.abs(paths.length_rate).max(initial=0.0)) / C0 * wave.frame_duration
+        return Delays(float(middle.min(initial=0.0)), float(middle.max(initial=0.0)), drift, latest)
+
+    def beside(self, least: float, most: float) -> Delays:
+        """Return them with echoes whose delays lie from `least` to `most` throughout the frame."""
+        return Delays(min(self.least, least), max(self.most, most), self.drift, max(self.latest, most))
+
+
+@dataclass(frozen=True)
+class Oscillator:
+    """What turns the beats of a frame: the straight part of its chirp error, which is a ramp of its own, and the rest
+    of it with one draw of the phase noise."""
+
+    wave: Waveform
+    off: float
+    """By how much [Hz] its carrier lies above that of the radar's waveform."""
+    track: PhaseTrack
+    spacing: float
+    """How far apart [s] delays may be that it turns as one group; infinite without errors."""
+
+    @staticmethod
+    def of(radar: Radar, delays: Delays, rng: np.random.Generator) -> Oscillator:
+        """Return a radar's, drawn for echoes of such delays."""
+        noise, wave = radar.impairments.phase_noise, radar.waveform
+        bent, bend = _straightened(wave, radar.impairments.chirp_error, delays.latest)
+        h = spacing(wave, noise, bend)
+        reach = 3.0 * h if np.isfinite(h) else 0.0
+        span = delays.least - reach - delays.drift, delays.most + reach + delays.drift
+        return Oscillator(bent, bent.carrier - wave.carrier, PhaseTrack(wave, noise, bend, span, rng), h)
+
+    def groups(self, delay: Floats) -> Iterator[tuple[float, Floats]]:
+        """Yield the delays [s] of groups, and the shares of echoes of delays (...) [s] in each, all in one without
+        errors. A path is in four groups."""
+        if not np.isfinite(self.spacing):
+            yield 0.0, np.ones(delay.shape)
+            return
+        node = np.floor(delay / self.spacing).astype(np.int64)
+        weights = lagrange(delay / self.spacing - node)
+        for k in range(int(node.min(initial=0)) - 1, int(node.max(initial=-4)) + 3):
+            share = np.zeros(delay.shape)
+            for i, weight in enumerate(weights):
+                share = np.where(node + i - 1 == k, weight, share)
+            if share.any():
+                yield k * self.spacing, share
+
+
+def faulty(paths: Paths, radar: Radar, by: np.random.Generator | Oscillator, method: str = "auto") -> Cube:
     """Return the noise-free samples of paths under the radar's chirp error and phase noise.
 
-    Args: method groups (see above), direct (each path for itself, exact but for the interpolated draw; slow), or auto:
-    direct for few paths. Groups take each path's delay at the middle of the frame.
+    Args: by, the oscillator, or what draws it; method groups (see above), direct (each path for itself, exact but for
+    the interpolated draw; slow), or auto: direct for few paths. Groups take each path's delay at the middle of the
+    frame.
     Raises: ValueError on an unknown method.
     """
     if method not in METHODS:
         raise ValueError(f"method {method!r}: must be one of {', '.join(METHODS)}")
-    noise, error = radar.impairments.phase_noise, radar.impairments.chirp_error
     wave = radar.waveform
     # Complex samples inside: of real ones the other half, by which the turn shows, would be lost.
     inner = replace(radar, noise=False, waveform=replace(wave, complex_sampling=True))
-    straight, bend, turned = _straightened(paths, inner, error)
-    delay = paths.delay + paths.length_rate / C0 * wave.centre
-    h = spacing(wave, noise, bend)
-    low, high = (float(f(initial=0.0)) for f in (delay.min, delay.max))
-    drift = float(np.abs(paths.length_rate).max(initial=0.0)) / C0 * wave.frame_duration
-    reach = 3.0 * h if np.isfinite(h) else 0.0
-    track = PhaseTrack(wave, noise, bend, (low - reach - drift, high + reach + drift), rng)
-    if method == "direct" or (method == "auto" and len(delay) <= _FEW):
-        total = _direct(turned, straight, track)
+    oscillator = by if isinstance(by, Oscillator) else Oscillator.of(radar, Delays.of(paths, wave), by)
+    # Amplitudes hold exp(-j 2 pi f_c tau_0) of the carrier as it should be.
+    turned = scaled(paths, np.exp(-2j * np.pi * oscillator.off * paths.delay))
+    straight = replace(inner, waveform=replace(oscillator.wave, complex_sampling=True))
+    if method == "direct" or (method == "auto" and len(paths.delay) <= _FEW):
+        total = _direct(turned, straight, oscillator.track)
     else:
-        total = _grouped(turned, straight, track, delay, h)
+        total = _grouped(turned, straight, oscillator, _middle(paths, wave))
     if not wave.complex_sampling:
         total.imag = 0.0
     return Cube(samples=total.astype(np.complex64), noise_power=0.0)
+
+
+def _middle(paths: Paths, wave: Waveform) -> Floats:
+    """Return the delays (n,) [s] of paths at the middle of the frame."""
+    return np.asarray(paths.delay + paths.length_rate / C0 * wave.centre)
 
 
 def spacing(wave: Waveform, noise: PhaseNoise | None, error: ChirpError | None) -> float:
@@ -165,41 +227,29 @@ class _BentRamp(Waveform):
         pass
 
 
-def _straightened(paths: Paths, radar: Radar, error: ChirpError | None) -> tuple[Radar, ChirpError | None, Paths]:
-    """Return radar, chirp error and paths with the straight part of the error moved into the waveform.
-
-    A line fitted to the error is a ramp of another carrier and slope, which is summed exactly. What is left is small.
-    """
+def _straightened(wave: Waveform, error: ChirpError | None, latest: float) -> tuple[Waveform, ChirpError | None]:
+    """Return a waveform with the straight part of a chirp error in it, and what is left of the error, which is small:
+    a line fitted to it is a ramp of another carrier and slope, which is summed exactly. Args: latest delay [s]."""
     if error is None:
-        return radar, None, paths
-    wave = radar.waveform
+        return wave, None
     t = np.arange(wave.n_samples) * wave.chirp_duration / wave.n_samples
     # Echoes bring the error of up to their delay before the ramp's first sample.
-    times = np.unique([x for x, _ in error.table] + [-float(paths.delay.max(initial=0.0)), t[0], t[-1]])
+    times = np.unique([x for x, _ in error.table] + [-latest, t[0], t[-1]])
     b, a = np.polyfit(t, error.frequency(t), 1) if len(t) > 1 else (0.0, float(error.frequency(0.0)))
     rest = ChirpError(np.column_stack([times, error.frequency(times) - a - b * times]))
     line = {"carrier": wave.carrier + a, "bandwidth": wave.bandwidth + b * wave.chirp_duration}
-    bent = _BentRamp(**vars(wave) | line)
-    # Amplitudes hold exp(-j 2 pi f_c tau_0) of the carrier as it should be.
-    turned = scaled(paths, np.exp(-2j * np.pi * a * paths.delay))
-    return replace(radar, waveform=bent), rest, turned
+    return _BentRamp(**vars(wave) | line), rest
 
 
-def _grouped(paths: Paths, radar: Radar, track: PhaseTrack, delay: Floats, h: float) -> Complexes:
-    """Return the sum of paths in groups h [s] apart, one at delay zero; delay (n,) [s] of each path."""
-    if not np.isfinite(h):
+def _grouped(paths: Paths, radar: Radar, oscillator: Oscillator, delay: Floats) -> Complexes:
+    """Return the sum of paths in groups of equal delay, one at delay zero; delay (n,) [s] of each path."""
+    if not np.isfinite(oscillator.spacing):
         return synthesize(paths, radar).samples.astype(np.complex128)
-    node = np.floor(delay / h).astype(np.int64)
-    weights = lagrange(delay / h - node)
     total = _nothing(paths, radar)
-    for k in range(int(node.min(initial=0)) - 1, int(node.max(initial=-4)) + 3):
-        share = np.zeros(len(delay))
-        for i, weight in enumerate(weights):
-            share = np.where(node + i - 1 == k, weight, share)
+    for at, share in oscillator.groups(delay):
         rows = np.flatnonzero(share)
-        if len(rows):
-            group = synthesize(_rows(paths, rows, share[rows]), radar)
-            total += group.samples * track.turn(k * h)
+        group = synthesize(_rows(paths, rows, share[rows]), radar)
+        total += group.samples * oscillator.track.turn(at)
     return total
 
 

@@ -108,8 +108,8 @@ def beam_to(radar: Radar, found: Detections, paths: Paths) -> Beams | None:
             sent, seen = (
                 np.where(image, x.conj(), x)
                 for x in (
-                    _phases(waves.tx_radius[part], waves.departure[part], senders, turn),
-                    _phases(waves.radius[part], waves.arrival[part], receivers, turn),
+                    _at_elements(waves.tx_radius[part], waves.departure[part], senders, turn),
+                    _at_elements(waves.radius[part], waves.arrival[part], receivers, turn),
                 )
             )
             held = (_in_slots(radar, weights.shape[1], sent, off, sign[part]) * (seen @ weights)).sum(axis=1)
@@ -136,15 +136,17 @@ def _shifts(radar: Radar) -> tuple[Floats, Floats, Floats]:
     return at * wave.range_resolution, share, np.linalg.pinv(turned, rcond=_SLIGHT).T
 
 
-def _phases(radius: Floats, look: Floats, elements: Floats, turn: float) -> NDArray[np.complex64]:
-    """Return the phase factors (n, e) at elements (e, 3) [m] of spherical waves from so far (n,) [m] along directions
-    (n, 3), as `array.excess` tells them, but of all elements at once and in single precision."""
+def _at_elements(radius: Floats, look: Floats, elements: Floats, turn: float) -> NDArray[np.complex64]:
+    """Return the factors (n, e) at elements (e, 3) [m] of spherical waves from so far (n,) [m] along directions (n, 3),
+    in phase and spreading, as `array.excess` tells them, but of all elements at once and in single precision."""
     far, along = radius.astype(np.float32)[:, None], look.astype(np.float32) @ elements.T.astype(np.float32)
     square = (elements**2).sum(axis=1).astype(np.float32)
-    whole = np.sqrt(np.maximum(far * (far - 2.0 * along) + square, 0.0)) + far
-    phase = np.float32(-turn) * (square - 2.0 * far * along) / np.maximum(whole, np.float32(1e-30))
+    there = np.sqrt(np.maximum(far * (far - 2.0 * along) + square, 0.0))
+    phase = np.float32(-turn) * (square - 2.0 * far * along) / np.maximum(there + far, np.float32(1e-30))
     found = np.empty(phase.shape, np.complex64)
     found.real, found.imag = np.cos(phase), np.sin(phase)
+    # Where waves of a footprint's points cancel, what is left tells how much less of each is at farther elements.
+    found *= np.divide(far, there, out=np.ones_like(there), where=there > 0.0)
     return found
 
 

@@ -15,7 +15,7 @@ Ints = NDArray[np.int64]
 Complexes = NDArray[np.complex128]
 
 _LITTLE = 0.1  # of what all paths bring to a cell: less by main lobes makes it a side lobe (not measured)
-_SLACK = 0.25  # resolution cells by which a peak may be shifted, by noise or by other echoes (not measured)
+SLACK = 0.25  # resolution cells by which a peak may be shifted, by noise or by other echoes (not measured)
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ def reaches(paths: Paths, rows: Ints, response: PointSpread, cell: Cell, power: 
 
 def from_main_lobes(paths: Paths, rows: Ints, response: PointSpread, cell: Cell) -> float:
     """Return the power that those of some paths whose main lobes reach a cell bring there, over that transmitted."""
-    total, reach = 0j, np.array(response.main_lobes) + _SLACK + (0.5 * cell.spread, 0.0)
+    total, reach = 0j, np.array(response.main_lobes) + SLACK + (0.5 * cell.spread, 0.0)
     for mirrored in (False, True) if response.mirrors else (False,):
         near = rows[ambiguities(paths, rows, response, cell.shown, mirrored, reach)[1]]
         wave = waves_shown(paths, near, cell.amplitude[near], response, cell.shown, mirrored).sum()

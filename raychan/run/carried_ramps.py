@@ -1,0 +1,199 @@
+"""Samples of a tracing's routes at the chirps about it, as their bodies move on, with and without phase errors."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raychan.channel.slow_time import Poses
+from raychan.radar.array import Transmission
+from raychan.radar.radar import Radar
+from raychan.radar.waveform import Waveform
+from raychan.run.between_chirps import carried_between
+from raychan.run.segments import Keyframe, PartFronts, Segment, echoes, joined, reach
+from raychan.signal.baseband import synthesize
+from raychan.signal.dechirp import ramp_sums
+from raychan.signal.phase_error import Delays, Oscillator
+from raychan.units import C0
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+Samples = NDArray[np.complexfloating[Any, Any]]
+
+# Trade time against memory; single values not measured.
+_AT_ONCE = 64  # chirps whose routes are held in memory at once
+_FEW = 3_000_000  # samples times parts of routes up to which the plain sum is faster than a transform
+
+
+@dataclass
+class CarriedRamps:
+    """What a radar receives of keyframes' routes at other chirps than theirs."""
+
+    radar: Radar
+    turns: NDArray[np.bool_]
+    """Which bodies (b,) are carried on."""
+    every: float = 1.0
+    """Chirps from one computed pose to the next."""
+    oscillator: Oscillator | None = None
+    """By which routes that meet these bodies are turned."""
+    least: float = 0.0
+    """Delays [s] of these routes so far: the least and the most, and zero."""
+    most: float = 0.0
+
+    def both(self, key: Keyframe, first: int, last: int) -> Samples:
+        """Return the samples (2, antenna, chirp, sample) of a keyframe's paths extrapolated to chirps first to last: of
+        those that meet turning bodies, and of all others."""
+        out = self._nothing(2, first, last)
+        out[1] = self._others(key, first, last)
+        self._carry(out[0], key, first)
+        return out
+
+    def turning(self, key: Keyframe, first: int, last: int) -> Samples:
+        """Return the first half (1, antenna, chirp, sample) of `both`."""
+        out = self._nothing(1, first, last)
+        self._carry(out[0], key, first)
+        return out
+
+    def _nothing(self, halves: int, first: int, last: int) -> Samples:
+        shape = halves, len(self.radar.elements), last - first + 1, self.radar.waveform.n_samples
+        return np.zeros(shape, np.complex64)
+
+    def _others(self, key: Keyframe, first: int, last: int) -> Samples:
+        """Return the samples (antenna, chirp, sample) of paths that meet no turning body, at chirps first to last."""
+        wave = self.radar.waveform
+        delay_rate = key.others.length_rate / C0 * (first - key.since) * wave.repetition
+        way = key.others.trajectories
+        late = key.others.replace(
+            length=key.others.length + C0 * delay_rate,
+            amplitude=key.others.amplitude * np.exp(-2j * np.pi * wave.carrier * delay_rate),
+            trajectories=way.replace(instant=way.instant + (key.since - first) * wave.repetition),
+        )
+        frame = dataclasses.replace(wave, n_chirps=last - first + 1)
+        return synthesize(late, dataclasses.replace(self.radar, waveform=frame), first=first).samples
+
+    def _carry(self, out: Samples, key: Keyframe, first: int) -> None:
+        """Add to samples (antenna, chirp, sample) from a chirp on what routes bring that meet turning bodies."""
+        wave, last = self.radar.waveform, first + out.shape[1] - 1
+        for routes, strength, fronts in zip(key.routes, key.strengths, key.fronts, strict=True):
+            for start in range(first, last + 1, _AT_ONCE):
+                count = min(_AT_ONCE, last + 1 - start)
+                # One instant more than chirps: the rate is the change from chirp to chirp.
+                at = np.arange(start, start + count + 1, dtype=float)
+                lengths, amplitudes = carried_between(
+                    routes, strength, partial(self._poses, key), at, self.every, wave.middle
+                )
+                # Phases are those of the carrier, from where the ramp begins.
+                amplitudes *= np.exp(2j * np.pi * wave.swept / C0 * lengths)
+                rows = out[:, start - first : start - first + count]
+                for sent in self.radar.transmissions:
+                    self._add(rows, (start, at - key.chirp), sent, lengths, amplitudes, fronts)
+
+    def _add(
+        self,
+        out: Samples,
+        begin: tuple[int, Floats],
+        sent: Transmission,
+        lengths: Floats,
+        amplitudes: Complexes,
+        fronts: PartFronts,
+    ) -> None:
+        """Add to samples (antenna, chirp, sample) what one transmitter brings over parts (chirp + 1, n, 3) of routes of
+        these lengths [m]. Args: begin, the number of the first chirp, and by how many chirps all come after the
+        keyframe (chirp + 1,)."""
+        (start, after), wave = begin, self.radar.waveform
+        chirps, late = slice(sent.since(start).first, None, sent.step), wave.repetition * after[:, None, None]
+        code = np.exp(2j * np.pi * (sent.turn * (start + np.arange(out.shape[1])[chirps]) % 1.0))[:, None]
+        split = np.asarray((amplitudes[:, :, 1:] != 0.0).any(axis=(0, 2)))
+        for layer, element in zip(out, self.radar.elements_world, strict=True):
+            longer, factor = fronts.between(sent.offset, element, split)
+            if fronts.drifting:
+                longer = longer + late * fronts.faster(sent.offset, element, split)
+            turn = np.sqrt(self.radar.power) * factor * np.exp(-2j * np.pi / wave.wavelength * longer)
+            brought = self._ramps(lengths + longer, amplitudes * turn, start, chirps)
+            layer[chirps] += brought if sent.turn == 0.0 else brought * code
+
+    def _ramps(self, lengths: Floats, amplitudes: Complexes, start: int, chirps: slice) -> Samples:
+        """Return the samples (chirp, sample) of some chirps, counted from number `start`, of parts (chirp + 1, n, 3) of
+        routes with these lengths [m]."""
+        wave, count = self.radar.waveform, len(lengths) - 1
+        parts = np.flatnonzero((amplitudes != 0.0).any(axis=0))
+        delay = lengths.reshape(count + 1, -1)[:, parts] / C0
+        delay_rate, delay = (np.diff(delay, axis=0) / wave.repetition)[chirps], delay[:-1][chirps]
+        strength = amplitudes.reshape(count + 1, -1)[:-1, parts][chirps]
+        if not delay.size:
+            return np.zeros((len(delay), wave.n_samples), np.complex128)
+        self.least, self.most = min(self.least, float(delay.min())), max(self.most, float(delay.max()))
+        if (by := self.oscillator) is None:
+            return self._sums(wave, strength, delay, delay_rate)
+        strength = strength * np.exp(-2j * np.pi * by.off * delay)
+        rows = np.arange(start, start + count)[chirps]
+        some = slice(int(rows[0]), int(rows[-1]) + 1, chirps.step)
+        total = np.zeros((len(delay), wave.n_samples), np.complex128)
+        for at, share in by.groups(delay):
+            mine = share.any(axis=0)
+            group = self._sums(by.wave, (strength * share)[:, mine], delay[:, mine], delay_rate[:, mine])
+            total += group * by.track.turn(at, some)
+        return total
+
+    def _sums(self, wave: Waveform, strength: Complexes, delay: Floats, delay_rate: Floats) -> Complexes:
+        """Return the samples (chirp, sample) of echoes (chirp, n) of so many delays [s] at each ramp of a waveform."""
+        if strength.shape[1] * wave.n_samples <= _FEW:
+            waves, d, g = np.ascontiguousarray(strength), np.ascontiguousarray(delay), np.ascontiguousarray(delay_rate)
+            step = wave.chirp_duration / wave.n_samples
+            return np.asarray(ramp_sums(waves, d, g, wave.carrier, wave.slope, step, wave.n_samples))
+        here = np.zeros(3)
+        single: dict[str, Any] = {"elements": here[None], "tx_elements": here[None], "multiplexing": "none"}
+        single |= {"ddm_slots": None, "waveform": dataclasses.replace(wave, n_chirps=1, complex_sampling=True)}
+        one = dataclasses.replace(self.radar, **single, power=1.0)
+        return np.stack(
+            [
+                synthesize(echoes(*row, here), one).samples[0, 0]
+                for row in zip(C0 * delay, strength, delay_rate, strict=True)
+            ]
+        )
+
+    def _poses(self, key: Keyframe, chirps: Floats) -> Poses:
+        """Return the poses of bodies and radar at chirps, relative to a keyframe."""
+        late = (chirps - key.chirp) * self.radar.waveform.repetition
+        motions, radar = [b.motion for b in key.scene.bodies], key.scene.radar
+        turn = np.broadcast_to(np.eye(3), (len(late), len(motions), 3, 3)).copy()
+        for b in np.flatnonzero(self.turns):
+            turn[:, b] = motions[b].poses(late)[0] @ motions[b].rotation().T
+        origin = np.array([m.origin() for m in motions])
+        return Poses(
+            origin=origin,
+            turn=turn,
+            place=np.stack([m.poses(late)[1] for m in motions], axis=1),
+            radar=radar.position + late[:, None] * radar.velocity,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class MadeAgain:
+    """The keyframes of a frame, from which its samples are made again as an oscillator turns them."""
+
+    keys: tuple[Keyframe, ...]
+    ramps: CarriedRamps
+    """That made the samples without phase errors."""
+
+    def beside(self, delays: Delays) -> Delays:
+        """Return the delays of a frame's paths and of the echoes here."""
+        return delays.beside(self.ramps.least, self.ramps.most)
+
+    def samples(self, oscillator: Oscillator) -> Samples:
+        """Return the samples (antenna, chirp, sample) of what meets turning bodies under phase errors."""
+        made = dataclasses.replace(self.ramps, oscillator=oscillator)
+        parts = []
+        for start, end in pairwise(self.keys):
+            far = reach(end.chirp - start.chirp)
+            a = made.turning(start, start.chirp, start.chirp + far)
+            b = made.turning(end, end.chirp - far, end.chirp)
+            parts.append(Segment(start, end, a, b).blend())
+        whole: Samples = joined(parts)[0]
+        return whole if self.ramps.radar.waveform.complex_sampling else whole.real.astype(complex)
