@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from raychan.processing.cell_echoes import CellEchoes
 from raychan.processing.doa import amplitudes, estimate
+from raychan.processing.near_field import NearAperture
 from raychan.processing.rivals import Judge, nearest
 from raychan.processing.slots import LONE, Slots
 from raychan.radar.aperture import Aperture
@@ -32,6 +33,9 @@ rectangles 11 are lost so without a word, of 1.0 28, and no run has more echoes 
 _APART = 0.05  # beam widths: nearer echoes share their power at the noise's whim (not measured)
 _ROUNDS = 20  # of seeking the echoes of different folds by turns (not measured)
 _STILL = 1e-4  # beam widths: echoes of different folds that move less have arrived (not measured)
+_AWAY = (1.0, 2.0)
+"""Times a cell's distance: from there waves come of what scatters, and of what mirrors the radar."""
+_OFF, _OFF_CELLS = 0.02, 0.05  # of the distance, and range cells: by which a source may stand off it (not measured)
 _SAFETY = 4.0  # on the power that a plane wave cannot fit (not measured)
 
 
@@ -43,6 +47,28 @@ class Scan:
     method: str
     range_resolution: float
     """[m]"""
+    parts: tuple[Floats, ...] = ()
+    """Places (a, 3) [m] of each element's receiver and transmitter, by which waves are curved; none: all are plane."""
+    known: bool = False
+    """Whether waves are curved as the aperture takes them to be."""
+
+    def fronts(self, distance: float) -> list[Scan]:
+        """Return how directions in a cell at a distance [m] are sought: in the near field as of spherical waves from
+        there and, as of mirrors, from twice as far, and last as of plane waves."""
+        if not self.parts or self.method != "bartlett" or distance <= 0.0 or self._curved(distance) <= _FLOOR:
+            return [self]
+        own = self.aperture
+        near = [NearAperture.of(own, self.parts, x * distance) for x in _AWAY]
+        return [replace(self, aperture=x, known=True) for x in [*near, own]]
+
+    def _curved(self, distance: Any) -> Any:
+        """Return the share of echoes' power (n,), at distances (n,) [m], that is no plane wave as theirs is curved, an
+        upper estimate; of those known to be curved so but for some."""
+        extent = np.ptp(self.aperture.elements, axis=0)
+        bend = 2.0 * np.pi / self.aperture.wavelength * float(extent @ extent) / (8.0 * np.maximum(distance, 1e-3))
+        if self.known:
+            bend = bend * np.minimum(1.0, _OFF + _OFF_CELLS * self.range_resolution / distance)
+        return _SAFETY * 4.0 / 45.0 * bend**2
 
     def misfit(self, directions: Floats, distances: Floats) -> Floats:
         """Return the share of echoes' power (n,) that one plane wave in one range cell cannot fit, an upper estimate.
@@ -55,8 +81,9 @@ class Scan:
         """
         extent = np.ptp(self.aperture.elements, axis=0)
         early = 0.25 * (np.abs(directions) @ extent[1:]) / self.range_resolution
-        bend = 2.0 * np.pi / self.aperture.wavelength * float(extent @ extent) / (8.0 * np.maximum(distances, 1e-3))
-        share = _FLOOR + self._beside + _SAFETY * ((2.0 * early) ** 2 / 3.0 + 4.0 / 45.0 * bend**2)
+        # Elements nearer to the source hold more of its wave.
+        uneven = self.known * 0.5 * (np.abs(directions) @ extent[1:]) / np.maximum(distances, 1e-3)
+        share = _FLOOR + self._beside + _SAFETY / 3.0 * ((2.0 * early) ** 2 + uneven**2) + self._curved(distances)
         return np.asarray(np.minimum(1.0, share))
 
     @cached_property
@@ -74,32 +101,34 @@ class Scan:
         shifts = np.stack([x.ravel() for x in np.meshgrid(*axes)], axis=1)
         return np.asarray(self.aperture.steering(direction + shifts).conj() / len(self.aperture.elements))
 
-    def through(self, weights: Complexes, waves: Complexes, directions: Floats, distances: Floats) -> Floats:
-        """Return the greatest power that beams of weights (b, a) let through of echoes (n,), over that in their own.
 
-        Args: waves (h, n, a) of the echoes in the antennas that the beams weigh, each in parts that may be in phase; as
-        for `misfit`."""
-        share = np.abs(weights @ waves.transpose(0, 2, 1)).sum(axis=0).max(axis=0) ** 2
-        return np.maximum(share, self.misfit(directions, distances))
+def through(weights: Complexes, waves: Complexes) -> Floats:
+    """Return the greatest power (n,) that beams of weights (b, a) let through of echoes, over that in their own.
+
+    Args: waves (h, n, a) of the echoes in the antennas that the beams weigh, each in parts that may be in phase."""
+    return np.asarray(np.abs(weights @ waves.transpose(0, 2, 1)).sum(axis=0).max(axis=0) ** 2)
 
 
 def echoes_in(
     snapshot: Complexes, scan: Scan, least: float, distance: float, slots: Slots = LONE, noise: float = 0.0
 ) -> CellEchoes:
-    """Return the echoes of a cell's snapshot (s * a,), of what its slots hold.
+    """Return the echoes of a cell's snapshot (s * a,), of what its slots hold: of waves of that form, spherical or
+    plane, of which fewest explain it, or that leave least.
 
     Args: least, power [W] below which a beam is noise; distance [m] of the cell; slots of transmitters; noise [W] of a
     receiver. Two echoes are told apart where both exceed `least` in their beams and what of both is no plane wave; by
     Bartlett's beams those of one fold only a beam width apart, or three quarters of it where both angles are measured.
     """
-    cell = _Cell(snapshot[None, :].astype(np.complex128), scan, slots, least, distance, noise)
-    most = min(_MOST, len(scan.aperture.elements) // 2)
-    found = cell.grown(slots.folds[:1], most)
-    # Of several folds fewer echoes must explain what is explained.
-    fewer = len(found.power) - 1 if found.explained else most
-    if fewer > 1 and len(slots.folds) > 1:
-        found = cell.better(found, cell.grown(slots.folds, fewer))
-    return cell.judged(found, most)
+    data, most = snapshot[None, :].astype(np.complex128), min(_MOST, len(scan.aperture.elements) // 2)
+    first, *others = (_Cell(data, front, slots, least, distance, noise) for front in scan.fronts(distance))
+    best = first.echoes(most)
+    for cell in others:
+        # Where several explain all, fewer must; of lone ones the stronger.
+        fewer = max(len(best.power) - 1, 1) if best.explained else most
+        found = cell.echoes(fewer, best.explained)
+        if found.order < (*best.order[:2], best.order[2] - noise * best.explained):
+            best = found
+    return best
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,6 +145,16 @@ class _Cell:
     """[m]"""
     noise: float
     """[W] of a receiver."""
+
+    def echoes(self, most: int, whole: bool = False) -> CellEchoes:
+        """Return at most so many echoes; with `whole`, of which it is asked whether they explain the cell."""
+        found = self.grown(self.slots.folds[:1], most)
+        # Of several folds fewer echoes must explain what is explained.
+        fewer = len(found.power) - 1 if found.explained else most
+        if fewer > 1 and len(self.slots.folds) > 1:
+            found = self.better(found, self.grown(self.slots.folds, fewer))
+        found = found if whole and not found.explained else self.judged(found, most)
+        return replace(found, left=self._energy(found.by_fold())) if self.scan.known else found
 
     def sought(self, data: Complexes, h: int, method: str, count: int) -> Floats:
         """Return the cosines (k, 2) of at most `count` echoes folded h times in data (1, s * a)."""
@@ -134,7 +173,8 @@ class _Cell:
         order = np.argsort(-power, kind="stable")
         misfit = self.scan.misfit(towards, np.full(len(towards), self.distance))
         least = max(self.least, float(misfit @ power))
-        return CellEchoes(towards[order], power[order], weights[order], fold[order], least=least)
+        found = towards[order], power[order], weights[order], fold[order]
+        return CellEchoes(*found, self.scan.aperture.steering(towards[order]), misfit[order], least=least)
 
     def beams_left(self, found: CellEchoes) -> Floats:
         """Return the power (h,) of the strongest beam of what echoes leave, by folds."""

@@ -33,10 +33,16 @@ class CellEchoes:
     """Beams (k, s * a): times the cell's snapshot (s * a,) the echoes' waves."""
     fold: Ints
     """(k,) how many times more than the snapshot is read."""
+    waves: Complexes
+    """What the transmitters' channels (k, t * a) hold of each, of unit amplitude."""
+    misfit: Floats
+    """Share (k,) of each one's power that may be no wave of that form."""
     rest: float = 0.0
     """Power [W] of the strongest beam of what they leave: more than noise where two echoes were not told apart."""
     least: float = 0.0
     """Power [W] below which what they leave is noise, or what of them is no plane wave."""
+    left: float = 0.0
+    """Power [W] of what they leave in all channels, where waves of several forms are sought."""
     open: bool | Bools = False
     """Which directions (k,) other sets of waves lack that explain the cell as well."""
 
@@ -44,6 +50,11 @@ class CellEchoes:
     def explained(self) -> bool:
         """Whether they leave noise, or what of them is no plane wave."""
         return self.rest <= self.least
+
+    @property
+    def order(self) -> tuple[bool, int, float]:
+        """What is less of echoes that explain a cell better than others do."""
+        return not self.explained, len(self.power) * self.explained, self.left
 
     def by_fold(self) -> dict[int, Floats]:
         """Return the directions of the echoes of each fold, first that of the strongest."""
@@ -56,7 +67,7 @@ class CellEchoes:
 
     def take(self, some: Bools) -> CellEchoes:
         """Return some of the echoes."""
-        names = ("direction", "power", "weights", "fold", "open")
+        names = ("direction", "power", "weights", "fold", "waves", "misfit", "open")
         return replace(self, **{x: getattr(self, x)[some] for x in names})
 
     def unsure(self, aperture: Aperture) -> NDArray[np.bool_]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.processing.angles import Scan, echoes_in
+from raychan.processing.angles import Scan, echoes_in, through
 from raychan.processing.cell_echoes import CellEchoes
 from raychan.processing.cfar import Grid
 from raychan.processing.fold_beside import judged_beside
@@ -66,11 +66,11 @@ class Splitter:
                 continue
             v, r = peaks.cells[i]
             fold, open_ = self._fold_beside(peaks, i, kept)
-            snapshot, distance = self._read(v, r, self._spans(peaks, i, fold, v)), float(self.map.range[r])
+            snapshot, distance = self._read(v, r, self._spans(peaks, i, fold, v)), self._distance(peaks.place[i])
             noise = float(peaks.noise[i]) * self.receiver_noise
             held = echoes_in(snapshot, self.scan, float(peaks.least[i]), distance, self.slots, noise)
             rows = [row for k in range(len(held.power)) if (row := self._placed(peaks, i, held, k, fold))]
-            rows = [replace(row, unsure=row.unsure or open_ or self._bent(held, distance)) for row in rows]
+            rows = [replace(row, unsure=row.unsure or open_ or self._bent(held)) for row in rows]
             beside += [row for row in rows if row.beside]
             found = [rows[0], *(row for row in rows[1:] if not row.beside and self._own(row, kept, peaks))]
             # The strongest in a cell may be the foot of one that has its own peak, beside which another one peaks here.
@@ -96,10 +96,13 @@ class Splitter:
         """How transmitters are told apart."""
         return self.map.slots if isinstance(self.map, ResolvedMap) else LONE
 
-    def _bent(self, held: CellEchoes, distance: float) -> bool:
+    def _distance(self, place: Floats) -> float:
+        """Return the distance [m] of a place (2,) in map cells."""
+        return float(self.map.range[0] + place[1] * self.map.range_resolution / self.grid.pad[1])
+
+    def _bent(self, held: CellEchoes) -> bool:
         """Return whether echoes of a cell may be parts of one wave that is no plane one at all."""
-        alike = np.full(len(held.power), distance)
-        return len(alike) > 1 and bool((self.scan.misfit(held.direction, alike) >= 1.0).any())
+        return len(held.power) > 1 and bool((held.misfit >= 1.0).any())
 
     def _fold(self, cell: Ints) -> int:
         """Return by how many spans a map cell (2,) is held to be folded."""
@@ -167,11 +170,9 @@ class Splitter:
         much = shown > _LITTLE * power
         some, rest = [kept[k] for k in np.flatnonzero(much)], rest + MARGIN * float(shown[~much].sum())
         waves, shares = self._lobes(place, fold, some, at[much])
-        distances = self.map.range[[row.cell[1] for row in some]]
-        directions = np.array([row.direction for row in some]).reshape(-1, 2)
-        through = self.scan.through(beams(), shares[:, :, None] * waves, directions, distances)
-        through = np.maximum(through, [row.misfit for row in some])
-        return bool(power > rest + float(together(np.sort(shown[much] * through)[::-1])))
+        let = through(beams(), shares[:, :, None] * waves)
+        let = np.maximum(let, [max(row.misfit, row.bent) for row in some])
+        return bool(power > rest + float(together(np.sort(shown[much] * let)[::-1])))
 
     def _shown(self, place: Floats, kept: list[Row], peaks: Peaks) -> tuple[Floats, Floats]:
         """Return the places (n, 2) of echoes, and what their side lobes show (n,) [W] at one (2,) at most, places in
@@ -185,7 +186,7 @@ class Splitter:
         times, in h parts, and the shares (h, n) of these in their amplitude.
 
         Args: at (n, 2) of the echoes, places in resolution cells."""
-        waves = self.scan.aperture.steering(np.array([row.direction for row in some]).reshape(-1, 2))
+        waves = np.array([row.wave for row in some], complex).reshape(-1, len(self.scan.aperture.elements))
         spans = (at[:, 0] - place[0]) / self.grid.count[0]
         # By time division side lobes are turned as their echo is; by Doppler division they fall on several slots.
         own = np.array([row.fold for row in some]) - fold + (np.rint(spans) if self.slots.shifted else spans)
@@ -250,7 +251,7 @@ class Splitter:
         # The beam of what slots hold under the echo's own fold, at its own rate.
         away = (row + shift[0, 0] - peaks.place[i, 0]) / shape[0]
         weights = self.slots.read_under(held.weights[k].conj(), more + away).conj()
-        fit = misfit, unsure, weights, own, shown
+        fit = misfit, float(held.misfit[k]), held.waves[k], unsure, weights, own, shown
         return Row(i, cell, shift[0], float(power[0]), noise, held.direction[k], *fit, aside, crest)
 
     def _same(self, one: Row, other: Row) -> bool:

@@ -19,12 +19,14 @@ _RIDGE = 1e-13  # of a wave's power: waves that come to lie on each other have a
 
 
 class Beams(NamedTuple):
-    """Beams as kernels take them: places (a, 3) [waves]; period (2,), infinite where directions do not repeat along y
+    """Beams as kernels take them: parts (p, a, 3) [waves], of which places are the sums; distance [waves] of the
+    sources, infinite of plane waves; period (2,), infinite where directions do not repeat along y
     or z; skewed (l, 2) lobes quite like the main one; steps (2, 2), the first distances of a search, one along each of
     two axes, 0 along one that is not measured; how often they are halved; whether the array is deep; whether it
     measures both cosines."""
 
-    places: Floats
+    parts: Floats
+    distance: float
     period: Floats
     skewed: Floats
     steps: Floats
@@ -34,11 +36,19 @@ class Beams(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def _point(wave, places, u, w):  # type: ignore[no-untyped-def]
-    """Write the phasors (a,) of a plane wave from cosines u and w along y and z at places (a, 3) [waves]."""
-    ahead = math.sqrt(max(1.0 - u * u - w * w, 0.0))
-    for i in range(len(places)):
-        phase = 2.0 * math.pi * (places[i, 0] * ahead + places[i, 1] * u + places[i, 2] * w)
+def _point(wave, beams, u, w):  # type: ignore[no-untyped-def]
+    """Write the phasors (a,) of a wave from cosines u and w along y and z."""
+    ahead, away = math.sqrt(max(1.0 - u * u - w * w, 0.0)), beams.distance
+    for i in range(len(wave)):
+        nearer = 0.0
+        for places in beams.parts:
+            x, y, z = places[i, 0], places[i, 1], places[i, 2]
+            along = x * ahead + y * u + z * w
+            if away < math.inf:
+                over = 2.0 * away * along - (x * x + y * y + z * z)
+                along = over / (away + math.sqrt(max(away * away - over, 0.0)))
+            nearer += along
+        phase = 2.0 * math.pi * nearer
         wave[i] = complex(math.cos(phase), math.sin(phase))
 
 
@@ -55,10 +65,10 @@ def _seen(rows, wave):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _power(snapshots, basis, places, u, w, wave):  # type: ignore[no-untyped-def]
+def _power(snapshots, basis, beams, u, w, wave):  # type: ignore[no-untyped-def]
     """Return the power that a wave from cosines u and w explains of snapshots (n, a) beside others of orthonormal rows
     basis (k, a); scratch: wave (a,)."""
-    _point(wave, places, u, w)
+    _point(wave, beams, u, w)
     alone = len(wave) - _seen(basis, wave)
     return _seen(snapshots, wave) / alone if alone > ALONE * len(wave) else 0.0
 
@@ -84,8 +94,8 @@ def _moved(u, w, axis, steps, beams):  # type: ignore[no-untyped-def]
 @njit(cache=True, nogil=True)
 def _climb(at, snapshots, basis, beams, wave, tried):  # type: ignore[no-untyped-def]
     """Move cosines at (2,) to the maximum next to them of `_power`, and return that; scratch: wave (a,), tried (2,)."""
-    places, period, skewed = beams.places, beams.period, beams.skewed
-    best = _power(snapshots, basis, places, at[0], at[1], wave)
+    period, skewed = beams.period, beams.skewed
+    best = _power(snapshots, basis, beams, at[0], at[1], wave)
     for s in range(beams.shrinks):
         for axis in range(2):
             step = 0.5**s
@@ -94,15 +104,15 @@ def _climb(at, snapshots, basis, beams, wave, tried):  # type: ignore[no-untyped
             # Beyond the visible edge the power goes on as smoothly, or as it does at the other edge.
             u, w = _moved(at[0], at[1], axis, -step, beams)
             u, w = canonical(u, w, period, skewed)
-            below = _power(snapshots, basis, places, u, w, wave)
+            below = _power(snapshots, basis, beams, u, w, wave)
             u, w = _moved(at[0], at[1], axis, step, beams)
             u, w = canonical(u, w, period, skewed)
-            above = _power(snapshots, basis, places, u, w, wave)
+            above = _power(snapshots, basis, beams, u, w, wave)
             bend = below - 2.0 * best + above
             shift = 0.5 * (below - above) / bend if bend < 0.0 else np.sign(above - below)
             tried[0], tried[1] = _moved(at[0], at[1], axis, min(max(shift, -1.0), 1.0) * step, beams)
             make_visible(tried, period, skewed)
-            value = _power(snapshots, basis, places, tried[0], tried[1], wave)
+            value = _power(snapshots, basis, beams, tried[0], tried[1], wave)
             if value > best:
                 best, at[0], at[1] = value, tried[0], tried[1]
     return best
@@ -113,7 +123,7 @@ def climb_beams(at, best, snapshots, basis, beams):  # type: ignore[no-untyped-d
     """Move cosines at (k, 2) to the maxima next to them of what a wave explains, and write that, best (k,).
 
     Args: snapshots (n, a), which others of orthonormal rows basis (m, a) leave; beams as `Beams`."""
-    wave, tried = np.empty(len(beams.places), np.complex128), np.empty(2)
+    wave, tried = np.empty(beams.parts.shape[1], np.complex128), np.empty(2)
     for k in range(len(at)):
         best[k] = _climb(at[k], snapshots, basis, beams, wave, tried)
 
@@ -144,18 +154,18 @@ def _all_but(own, rest, snapshots, waves, gram, amplitude):  # type: ignore[no-u
 def refine_beams(at, snapshots, beams, rounds, still):  # type: ignore[no-untyped-def]
     """Move cosines at (k, 2) by turns, each to the maximum of the power that the others' waves leave of snapshots
     (n, a), until none moves by more than `still` (2,), but at most `rounds` times. Args: beams as `Beams`."""
-    count, many = len(at), len(beams.places)
+    count, many = len(at), beams.parts.shape[1]
     waves, wave, tried = np.empty((count, many), np.complex128), np.empty(many, np.complex128), np.empty(2)
     gram, amplitude = np.empty((count, count), np.complex128), np.empty(count, np.complex128)
     rest, before, none = np.empty_like(snapshots), np.empty_like(at), np.empty((0, many), np.complex128)
     for k in range(count):
-        _point(waves[k], beams.places, at[k, 0], at[k, 1])
+        _point(waves[k], beams, at[k, 0], at[k, 1])
     for _ in range(rounds):
         before[:] = at
         for k in range(count):
             _all_but(k, rest, snapshots, waves, gram, amplitude)
             _climb(at[k], rest, none, beams, wave, tried)
-            _point(waves[k], beams.places, at[k, 0], at[k, 1])
+            _point(waves[k], beams, at[k, 0], at[k, 1])
         moved = False
         for k in range(count):
             moved |= abs(at[k, 0] - before[k, 0]) >= still[0] or abs(at[k, 1] - before[k, 1]) >= still[1]
@@ -199,19 +209,19 @@ def refine_sets(at, left, snapshots, beams, rounds, still):  # type: ignore[no-u
     """Move the waves of sets at (s, k, 2) by turns, each to where it explains most of snapshots (n, a) beside the
     others, until none moves by more than `still` (2,), but at most `rounds` times; write what sets leave, left (s,)."""
     sets, count = at.shape[:2]
-    many = len(beams.places)
+    many = beams.parts.shape[1]
     waves, basis = np.empty((count, many), np.complex128), np.empty((count, many), np.complex128)
     wave, tried = np.empty(many, np.complex128), np.empty(2)
     rest, before = np.empty_like(snapshots), np.empty((count, 2))
     for s in range(sets):
         for k in range(count):
-            _point(waves[k], beams.places, at[s, k, 0], at[s, k, 1])
+            _point(waves[k], beams, at[s, k, 0], at[s, k, 1])
         for _ in range(rounds):
             before[:] = at[s]
             for k in range(count):
                 _outside(k, basis, rest, snapshots, waves)
                 _climb(at[s, k], rest, basis, beams, wave, tried)
-                _point(waves[k], beams.places, at[s, k, 0], at[s, k, 1])
+                _point(waves[k], beams, at[s, k, 0], at[s, k, 1])
             moved = False
             for k in range(count):
                 moved |= abs(at[s, k, 0] - before[k, 0]) >= still[0] or abs(at[s, k, 1] - before[k, 1]) >= still[1]

@@ -16,6 +16,7 @@ from raychan.processing.cfar import GUARD, TRAIN, Grid, Training, bias, factor, 
 from raychan.processing.detector_map import BEAMS, DetectorMap, MeanPower, StrongestBeam
 from raychan.processing.found import BEFORE, Echoes, Found, Peaks
 from raychan.processing.line_lobes import LineLobes
+from raychan.processing.near_field import parts_of
 from raychan.processing.peak_shape import PeakShape
 from raychan.processing.peaks import SideLobes
 from raychan.processing.staggered import ResolvedMap
@@ -110,6 +111,7 @@ def detect(
     chirps: int | None = None,
     waveform: Waveform | None = None,
     elements: Floats | None = None,
+    senders: Floats | None = None,
     array: Array | None = None,
     seen: DetectorMap | None = None,
 ) -> Detections:
@@ -121,8 +123,8 @@ def detect(
     stronger in their row or column, are dropped.
     Args: method ca or os; guard [resolution cells], train [cells a side] and windows: all (rate, range), see
     processing.cfar; chirps that the window along rate weighs, where they are not the map's resolution cells; waveform,
-    for the response and the range migration of echoes and, with elements (a, 3) [m], for angles; array, how these are
-    used; seen, the map as `seen_in` returns it, where it is known.
+    for the response and the range migration of echoes and, with elements (a, 3) [m], for angles; senders (t, 3) [m],
+    transmitters of virtual elements; array, how these are used; seen, the map as `seen_in` returns it, if known.
     Raises: ValueError on bad arguments.
     """
     grid, array, aperture = Grid.of(map), array or Array(), _aperture(map, waveform, elements)
@@ -151,7 +153,8 @@ def detect(
         return _reported(map, grid, Found(cells, shift, power, noise).take(kept), ego_speed, wraps=shape.wraps)
     towards = bank.directions[bank.towards(map.spectrum, cells)]
     peaks = Peaks(cells, shift, power, noise, shown, bar.of_beam(bank, local, pfa), smear, towards)
-    scan, coherent = Scan(aperture, array.doa, map.range_resolution), array.beams == "coherent"
+    parts = parts_of(aperture.elements, senders)
+    scan, coherent = Scan(aperture, array.doa, map.range_resolution, parts), array.beams == "coherent"
     echoes = Splitter(map, grid, lobes, lines, shape, scan, seen.receiver_noise, coherent).split(peaks)
     loud = db(echoes.power / np.maximum(echoes.noise, _TINY)) >= min_snr_db
     return _reported(map, grid, echoes.take(loud), ego_speed, aperture, seen.looks, shape.wraps)

@@ -15,6 +15,7 @@ from raychan.processing.covariance import Covariance, covariance
 from raychan.processing.esprit import esprit
 from raychan.processing.joint_search import joint
 from raychan.processing.monopulse import monopulse
+from raychan.processing.near_field import NearAperture
 from raychan.processing.rivals import searched
 from raychan.processing.source_number import source_number
 from raychan.processing.spectra import BEAMS_PER_BEAM, Bartlett, beams_of, capon, climb, music, peaks, squared
@@ -118,11 +119,17 @@ def estimate(data: Complexes, aperture: Aperture, method: str, count: int, made:
     found = nearest_boresight(aperture, _sought(data, aperture, method, count, made))
     for k in range(len(found)):
         # Those of flat arrays, and of arrays in a tilted plane, are given so already.
-        if len(near := nearer(aperture, found[k])):
+        if len(near := nearer(aperture, found[k])) or len(near := _alias(aperture, found[k])):
             others = np.delete(found, k, axis=0)
             rest = data - amplitudes(data, aperture, others) @ aperture.steering(others)
             found[k] = _untold(rest, aperture, found[k], near, len(found))
     return found
+
+
+def _alias(aperture: Aperture, one: Floats) -> Floats:
+    """Return the direction (k, 2), none or one, nearest boresight that looks like one (2,) but for how waves bend."""
+    other = aperture.far.canonical(one[None]) if isinstance(aperture, NearAperture) else one[None]
+    return np.asarray(other[np.abs(other - one).max(axis=1) > 0.0])
 
 
 def _untold(data: Complexes, aperture: Aperture, one: Floats, near: Floats, count: int) -> Floats:

@@ -80,6 +80,10 @@ class Row:
     direction: Floats
     misfit: float
     """Share of the power that is no plane wave: an echo that was not told apart from it, seen by all beams."""
+    bent: float
+    """The same of any echo there: its wave is curved, and elements see it at different ranges."""
+    wave: Complexes
+    """(t * a,) what the transmitters' channels hold of it, of unit amplitude."""
     unsure: bool
     weights: Complexes
     """(s * a,) of its beam, of what slots hold under its fold and at its rate, nulls towards others of the cell."""

@@ -15,6 +15,7 @@ from scipy.ndimage import maximum_filter
 
 from raychan.processing.climb_kernels import ALONE, Beams, climb_beams, snapshots_for
 from raychan.processing.covariance import Covariance
+from raychan.processing.near_field import NearAperture
 from raychan.processing.twins import alike, beam, nearest_boresight, neighbours
 from raychan.radar.aperture import Aperture, Grid
 
@@ -239,6 +240,18 @@ def steps_of(aperture: Aperture, grid: Grid) -> Floats:
 
 def beams_of(aperture: Aperture, grid: Grid) -> Beams:
     """Return an array's beams as kernels take them, to search from points of a grid."""
-    places, skewed = aperture.elements / aperture.wavelength, np.ascontiguousarray(aperture.skewed, np.float64)
-    steps = steps_of(aperture, grid)
-    return Beams(places, aperture.repeats, skewed, steps, _SHRINKS, aperture.deep, all(aperture.scans))
+    parts: tuple[Floats, ...] = (aperture.elements,)
+    away = np.inf
+    if isinstance(aperture, NearAperture):
+        parts, away = aperture.parts, aperture.distance / aperture.wavelength
+    skewed, steps = np.ascontiguousarray(aperture.skewed, np.float64), steps_of(aperture, grid)
+    return Beams(
+        np.stack(parts) / aperture.wavelength,
+        away,
+        aperture.repeats,
+        skewed,
+        steps,
+        _SHRINKS,
+        aperture.deep,
+        all(aperture.scans),
+    )

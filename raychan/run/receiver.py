@@ -79,7 +79,8 @@ def seen_in_map(rdmap: RangeDoppler, radar: Radar, settings: Any) -> DetectorMap
 
 def detections_in(rdmap: RangeDoppler, radar: Radar, settings: Any, seen: DetectorMap | None = None) -> Detections:
     """Return what the receiver detects in its map; it sees nothing else of the scene."""
-    found = detect(rdmap, ego_speed=radar.ego_speed, seen=seen, **_detector(rdmap, radar, settings))
+    given = _detector(rdmap, radar, settings)
+    found = detect(rdmap, ego_speed=radar.ego_speed, seen=seen, senders=radar.tx_elements, **given)
     return unfolded(rdmap, found, radar)
 
 

@@ -24,6 +24,7 @@ Complexes = NDArray[np.complex128]
 
 _BEAMS = 33  # along each axis, over the directions from which an array sees a near echo (not measured)
 _ROUND = 0.9  # of a power: a peak that keeps more (0.46 dB, below what is told) is round, and not split
+_WHOLE = 0.99  # of a power: a beam of spherical waves keeps more (0.04 dB) of its own (not measured)
 _OFF = 0.05  # cells between the places where the peak is sought: 0.01 dB of a Hann window's main lobe
 _APART = 0.1  # the same where both are sought: 0.015 dB
 _LITTLE = 0.03  # dB: what causes but the largest lose together is told from this on (not measured)
@@ -58,7 +59,7 @@ def beam_losses(found: ExplainedDetections, reasons: Sequence[Explanation], rada
     whole, source = each.max(axis=0), _sources(found, looks)
     # Those that come together are more than each, and not quite their sum.
     for i in np.flatnonzero(each.sum(axis=0) > whole + _LITTLE):
-        waves = [_waves(radar, source[i : i + 1], beams[i][None])[end][0, :, 0] for end in range(2)]
+        waves = [x[0, :, 0] ** bool(near[i]) for x in _waves(radar, source[i : i + 1], beams[i][None])]
         held = _together(np.outer(*waves).ravel(), (ranges[i], rates[i]), tapers)
         whole[i] = max(whole[i], -db(max(held, 1e-30)))
     return BeamLosses(near, by_range, by_rate, whole, range_cells, rate_cells)
@@ -80,14 +81,28 @@ def _near_field(found: ExplainedDetections, radar: Radar, looks: Floats) -> tupl
         return np.zeros(len(best)), best
     source = _sources(found, looks)
     held = _through(radar, source, np.zeros((1, 3)))[:, 0]
-    for i in np.flatnonzero(held < _ROUND):
+    # Beams of spherical waves, in which near echoes are seen, lose nothing.
+    own = _in_own_beams(found, radar, source) > np.maximum(held, _WHOLE)
+    for i in np.flatnonzero((held < _ROUND) & ~own):
         # Near an array a beam's peak splits: beams beside the echo's direction read more.
         spread = 0.5 * np.ptp(aperture.elements, axis=0) / max(np.linalg.norm(source[i, 1]), 1e-9)
         steps = [np.linspace(-x, x, _BEAMS) if x > 0.0 else np.zeros(1) for x in spread[1:]]
         beside = np.stack(np.meshgrid(0.0, *steps), axis=-1).reshape(-1, 3)
         through = _through(radar, source[i : i + 1], beside)[0]
         held[i], best[i] = through.max(), beside[np.argmax(through)]
-    return -db(np.maximum(held, 1e-30)), best
+    return np.where(own, 0.0, -db(np.maximum(held, 1e-30))), best
+
+
+def _in_own_beams(found: ExplainedDetections, radar: Radar, source: Floats) -> Floats:
+    """Return the power (n,) that the beams of detections keep of waves from sources (n, 2, 3) [m]; 0 without beams."""
+    count = len(radar.virtual_elements)
+    if found.beam.shape[1] < count:
+        return np.zeros(len(source))
+    turn, held = 2.0 * np.pi * radar.waveform.middle / C0, []
+    for end, elements in enumerate((radar.tx_elements, radar.elements)):
+        held.append(np.exp(-1j * turn * np.linalg.norm(source[:, end, None] - elements, axis=2)))
+    waves = (held[0][:, :, None] * held[1][:, None]).reshape(-1, count)
+    return np.asarray(np.abs((found.beam[:, :count] * waves).sum(axis=1)) ** 2)
 
 
 def _sources(found: ExplainedDetections, looks: Floats) -> Floats:

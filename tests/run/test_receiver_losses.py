@@ -13,11 +13,13 @@ from raychan.units import C0
 STEP = 0.5 * C0 / 77e9
 
 
-def run(place, rate=0.0, window="hann", chirps=16, pad=2, azimuth=0.2, bandwidth=1e9, samples=128, **radar):
+def run(
+    place, rate=0.0, window="hann", chirps=16, pad=2, azimuth=0.2, bandwidth=1e9, samples=128, doa="bartlett", **radar
+):
     """Return a run of a point target of 10 dBsm on a direction of 0.2 rad, and its radar."""
     wave = rc.Waveform(77e9, bandwidth, 20e-6, 40e-6, chirps, samples)
     look = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
-    settings = rc.Processing(range_window=window, rate_window=window, pad=(pad, pad))
+    settings = rc.Processing(range_window=window, rate_window=window, pad=(pad, pad), doa=doa)
     made = rc.Radar(wave, noise=False, position=(0.0, 0.0, 0.0), processing=settings, **radar)
     target = {"shape": "box", "rcs_dbsm": 10.0, "rcs_point": (0.0, 0.0, 0.0)}
     body = rc.Body("target", position=place * look, velocity=rate * look, **target)
@@ -39,12 +41,20 @@ def level(result):
 @pytest.mark.parametrize("receivers", [2, 64, 112])
 def test_a_beam_loses_what_is_told_of_a_spherical_wave(receivers, place):
     elements = uniform_array(receivers, STEP)
-    near, radar = run(place, elements=elements)
+    near, radar = run(place, elements=elements, doa="music")
     loss = near_field_losses(near.detections, radar)
     assert loss == pytest.approx([level(run(place)[0]) - level(near)], abs=0.06)
     said = [x for x in near.warnings if "near field" in x]
     assert len(said) == (loss[0] > 0.5)
     assert all(f"{up(loss[0])} dB less" in x and f"= {far_field_distance(radar):.3g} m" in x for x in said)
+
+
+@pytest.mark.parametrize("place", [3.0, 6.0])
+def test_a_beam_of_spherical_waves_loses_nothing(place):
+    near, radar = run(place, elements=uniform_array(112, STEP))
+    assert level(near) == pytest.approx(level(run(place)[0]), abs=0.06)
+    assert near_field_losses(near.detections, radar)[0] < 0.06
+    assert not any("near field" in x for x in near.warnings)
 
 
 def test_an_array_beside_the_phase_centre_loses_no_more_than_about_it():
@@ -60,7 +70,7 @@ def test_an_array_beside_the_phase_centre_loses_no_more_than_about_it():
 
 
 def test_transmitters_and_receivers_lose_each_by_itself():
-    near, radar = run(8.0, **mimo_array(8, 16, STEP), multiplexing="tdm")
+    near, radar = run(8.0, **mimo_array(8, 16, STEP), multiplexing="tdm", doa="music")
     far, _ = run(8.0)
     assert near_field_losses(near.detections, radar) == pytest.approx([level(far) - level(near)], abs=0.06)
 
@@ -82,7 +92,7 @@ def test_a_peak_loses_what_is_told_of_an_echo_that_migrates(window):
 
 @pytest.mark.parametrize(("receivers", "place"), [(64, 0.6), (128, 2.0)])
 def test_where_a_beams_peak_splits_what_is_told_is_the_loss_of_the_best_beam(receivers, place):
-    near, radar = run(place, elements=uniform_array(receivers, STEP))
+    near, radar = run(place, elements=uniform_array(receivers, STEP), doa="music")
     found, y = near.detections, radar.elements[:, 1]
     assert len(found.range) == 2
     for away, azimuth, told in zip(found.range, found.azimuth, near_field_losses(found, radar), strict=True):
@@ -145,7 +155,7 @@ def test_a_weaker_echo_told_apart_in_the_cell_of_a_near_one_is_no_side_lobe_of_i
 def test_losses_that_come_together_are_told_in_one_figure_that_is_not_exceeded(away, azimuth, bandwidth):
     """Of a near wave whose range differs over the elements each loss alone is less than both."""
     wide = {"azimuth": azimuth, "bandwidth": bandwidth, "chirps": 24}
-    both, radar = run(away, **wide, **mimo_array(3, 48, STEP * 2.2), multiplexing="tdm")
+    both, radar = run(away, **wide, **mimo_array(3, 48, STEP * 2.2), multiplexing="tdm", doa="music")
     one, _ = run(away, **(wide | {"chirps": 8}))
     less, said = level(one) - found_level(both), [x for x in both.warnings if "dB less" in x]
     losses = beam_losses(both.detections, both.provenance, radar)
@@ -158,7 +168,7 @@ def test_losses_that_come_together_are_told_in_one_figure_that_is_not_exceeded(a
 
 def test_two_losses_of_which_none_is_told_alone_are_told():
     wide = mimo_array(3, 48, STEP * 2.2)
-    both, radar = run(22.0, azimuth=0.9, bandwidth=5e8, chirps=24, **wide, multiplexing="tdm")
+    both, radar = run(22.0, azimuth=0.9, bandwidth=5e8, chirps=24, **wide, multiplexing="tdm", doa="music")
     losses = beam_losses(both.detections, both.provenance, radar)
     assert losses.near[0] < 0.5 and losses.ranges[0] < 0.5 < losses.whole[0]
     assert sum("dB less" in x and "counted in" in x for x in both.warnings) == 1
@@ -166,7 +176,7 @@ def test_two_losses_of_which_none_is_told_alone_are_told():
 
 def test_an_echo_that_shows_in_a_grating_lobe_loses_by_where_it_comes_from():
     wide = {"azimuth": 0.87, "bandwidth": 1.2e9, "samples": 256}
-    lobes, radar = run(14.0, **wide, elements=uniform_array(32, 4.0 * STEP))
+    lobes, radar = run(14.0, **wide, elements=uniform_array(32, 4.0 * STEP), doa="music")
     assert abs(lobes.detections.azimuth[0]) < 0.4
     one, _ = run(14.0, **wide)
     losses = beam_losses(lobes.detections, lobes.provenance, radar)
