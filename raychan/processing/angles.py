@@ -36,7 +36,7 @@ _STILL = 1e-4  # beam widths: echoes of different folds that move less have arri
 _AWAY = (1.0, 2.0)
 """Times a cell's distance: from there waves come of what scatters, and of what mirrors the radar."""
 _OFF, _OFF_CELLS = 0.02, 0.05  # of the distance, and range cells: by which a source may stand off it (not measured)
-_SAFETY = 4.0  # on the power that a plane wave cannot fit (not measured)
+_SAFETY = 4.0  # on the power of a bent or uneven wave that a plane one cannot fit (not measured)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,15 +75,16 @@ class Scan:
 
         Args: directions, cosines (n, 2); distances (n,) [m].
         Three causes: the element farthest out sees the echo earlier by x range cells, on the slope of the window's
-        response (at most 2 x of the amplitude); and the wave is curved, by the phase k D^2 / 8 r at the rim, of
-        whose power 4/45 is left by the best plane (integral of the parabola less its mean); and of a line that spreads
-        a little beside itself beams are those of a straight one.
+        response (at most 2 x of the amplitude; of 300 lone echoes none leaves over an eighth of that power); and the
+        wave is curved, by the phase k D^2 / 8 r at the rim, of whose power 4/45 is left by the best plane (integral of
+        the parabola less its mean); and of a line that spreads a little beside itself beams are those of a straight
+        one.
         """
         extent = np.ptp(self.aperture.elements, axis=0)
         early = 0.25 * (np.abs(directions) @ extent[1:]) / self.range_resolution
         # Elements nearer to the source hold more of its wave.
         uneven = self.known * 0.5 * (np.abs(directions) @ extent[1:]) / np.maximum(distances, 1e-3)
-        share = _FLOOR + self._beside + _SAFETY / 3.0 * ((2.0 * early) ** 2 + uneven**2) + self._curved(distances)
+        share = _FLOOR + self._beside + ((2.0 * early) ** 2 + _SAFETY * uneven**2) / 3.0 + self._curved(distances)
         return np.asarray(np.minimum(1.0, share))
 
     @cached_property
@@ -205,7 +206,9 @@ class _Cell:
             return found
         ((h, at),) = folds.items()
         misfit = self.scan.misfit(at, np.full(len(at), self.distance)) * len(own.elements)
-        judge = Judge(self._channels(self.data, h), own, self.noise, float(misfit @ found.power), self._told_apart)
+        judge = Judge(
+            self._channels(self.data, h), own, self.noise, float(misfit @ found.power), self._told_apart("bartlett")
+        )
         if (towards := judge.better(at, most)) is not at:
             found = self.told({h: towards})
             found = replace(found, rest=float(self.beams_left(found).max()))
@@ -233,7 +236,7 @@ class _Cell:
         if found.explained and not mixed.explained:
             return found
         count = len(mixed.power) if mixed.explained else max(len(found.power), len(mixed.power))
-        one = self._by_turns({0: count})
+        one = self._by_turns({0: count}, self.scan.method)
         return (
             found if one is None or self._energy(one) <= self._energy(mixed.by_fold()) + self._clear(found) else mixed
         )
@@ -244,18 +247,31 @@ class _Cell:
         known = found.by_fold()
         counts = {h: len(x) for h, x in known.items()}
         tried = [counts | {h: counts.get(h, 0) + many} for h in dict.fromkeys([*known, other])]
-        ways = [way for more in tried if (way := self._by_turns(more))]
+        # Weak echoes of one snapshot raise no maximum of other methods' spectra, or one beside them: beams find them.
+        sets = [self._best_of(tried, method, found) for method in dict.fromkeys([self.scan.method, "bartlett"])]
+        told = [way for way in sets if way is not None]
+        if not told:
+            return None
+        return self.told(self._first(told, self.least * len(self.scan.aperture.elements)))
+
+    def _best_of(self, tried: list[dict[int, int]], method: str, found: CellEchoes) -> dict[int, Floats] | None:
+        """Return the directions, by folds, of as many echoes as are tried; None where a method tells them not apart."""
+        ways = [way for more in tried if (way := self._by_turns(more, method))]
         if not ways:
             return None
-        left = [self._energy(way) for way in ways]
-        way = next(way for way, rest in zip(ways, left, strict=True) if rest <= min(left) + self._clear(found))
-        near = any(nearest(x, self.scan.aperture) < self._told_apart for x in way.values())
-        return None if near else self.told(way)
+        way = self._first(ways, self._clear(found))
+        near = any(nearest(x, self.scan.aperture) < self._told_apart(method) for x in way.values())
+        return None if near else way
 
-    @property
-    def _told_apart(self) -> float:
+    def _first(self, ways: list[dict[int, Floats]], clear: float) -> dict[int, Floats]:
+        """Return the first of sets of directions that leaves no more than any other by a power in all channels."""
+        left = [self._energy(way) for way in ways]
+        return next(way for way, rest in zip(ways, left, strict=True) if rest <= min(left) + clear)
+
+    def _told_apart(self, method: str) -> float:
+        """Return how far apart [beam widths] a method tells echoes."""
         told = _TOLD_BY_PLANES if all(self.scan.aperture.scans) else _TOLD_BY_LINES
-        return told if self.scan.method == "bartlett" else _APART
+        return told if method == "bartlett" else _APART
 
     def _energy(self, directions: dict[int, Floats]) -> float:
         """Return the power in all channels of what echoes leave."""
@@ -265,15 +281,15 @@ class _Cell:
         """Return the power in all channels of an echo that a beam tells from noise."""
         return found.least * len(self.scan.aperture.elements)
 
-    def _by_turns(self, counts: dict[int, int]) -> dict[int, Floats] | None:
+    def _by_turns(self, counts: dict[int, int], method: str) -> dict[int, Floats] | None:
         """Return the cosines (k, 2) of as many echoes of each fold as are counted, those of each fold sought by turns
-        in what the others leave; None where the method finds fewer."""
+        in what the others leave; None where a method finds fewer."""
         found: dict[int, Floats] = {}
         for _ in range(_ROUNDS if len(counts) > 1 else 1):
             before = dict(found)
             for h, count in counts.items():
                 rest = self._left(found, h) if found else self.data
-                found[h] = self.sought(rest, h, self.scan.method, count)
+                found[h] = self.sought(rest, h, method, count)
                 if len(found[h]) < count:
                     return None
             width = self.scan.aperture

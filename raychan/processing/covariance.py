@@ -45,7 +45,7 @@ def covariance(snapshots: Complexes, aperture: Aperture, smoothing: float | None
     """Return the covariance of snapshots (n, a), averaged forwards and backwards where the array is symmetric.
 
     Args: smoothing, rows of a sub-array over those of the array (1: none); None takes SUB_ARRAY for fewer snapshots
-    than elements, where they fill a line or rectangle, else 1.
+    than elements, where they fill a line or rectangle, else 1 (`doa` smooths coherent waves of more, too).
     Source: Shan, Wax and Kailath 1985 (smoothing); Pillai and Kwon 1989 (forward-backward).
     """
     if smoothing is None:

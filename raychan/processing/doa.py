@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from raychan.blas import on_one_blas_thread
 from raychan.columns import Record, column
 from raychan.processing.climb_kernels import refine_beams, snapshots_for
-from raychan.processing.covariance import Covariance, covariance
+from raychan.processing.covariance import SUB_ARRAY, Covariance, covariance
 from raychan.processing.esprit import esprit
 from raychan.processing.joint_search import joint
 from raychan.processing.monopulse import monopulse
@@ -64,8 +64,10 @@ def doa(
     Args: snapshots (n, a) or (a,), complex [sqrt(W)]; elements (a, 3) [m] in the antenna's frame; wavelength [m];
     method: bartlett (each echo is subtracted before the next is sought), capon, music, esprit (uniform lines) or
     monopulse (one echo, uniform lines); sources, how many, or None: by criterion mdl or aic, which are asymptotic:
-    of one snapshot they tell too many in about a third of cases; smoothing: see `covariance`. A direction whose power
-    is below the rounding of the snapshots is left out. The noise is not known: `ambiguous` tells of equal ones only.
+    of one snapshot they tell too many in about a third of cases; smoothing, rows of a sub-array over those of a uniform
+    line or rectangle (1: no averaging); None takes 2/3 for fewer snapshots than elements, or coherent waves (the
+    covariance shows fewer than there are), else 1. A direction whose power is below the rounding of the snapshots is
+    left out. The noise is not known: `ambiguous` tells of equal ones only.
     Raises: ValueError on bad arguments, or an array that measures no angle or is unfit for the method.
     """
     check_type("wavelength", wavelength, float)
@@ -93,8 +95,8 @@ def doa(
     if size == 0.0:  # silence has no direction
         sources = 0
     data = data / (size or 1.0)
-    made = covariance(data, aperture, smoothing)
     count = _counted(data, aperture, criterion, smoothing) if sources is None else int(sources)
+    made = _averaged(data, aperture, smoothing, count)
     found = estimate(data, aperture, method, count, made) if count else np.zeros((0, 2))
     waves = np.abs(amplitudes(data, aperture, found))
     share, power = (waves**2).mean(axis=0), ((size * waves) ** 2).mean(axis=0)
@@ -108,9 +110,21 @@ def doa(
 
 def _counted(data: Complexes, aperture: Aperture, criterion: str, smoothing: float | None) -> int:
     """Return the number of sources by a criterion; few snapshots are smoothed further than for directions."""
-    if smoothing is None and aperture.table is not None and len(data) < data.shape[1]:
-        smoothing = _COUNTING
-    return source_number(covariance(data, aperture, smoothing), criterion)
+    if smoothing is not None or aperture.table is None:
+        return source_number(covariance(data, aperture, smoothing), criterion)
+    if len(data) < data.shape[1]:
+        return source_number(covariance(data, aperture, _COUNTING), criterion)
+    # Coherent waves are counted in sub-arrays, which share their noise: no more snapshots than there are.
+    parts = replace(covariance(data, aperture, SUB_ARRAY), snapshots=len(data))
+    return max(source_number(covariance(data, aperture), criterion), source_number(parts, criterion))
+
+
+def _averaged(data: Complexes, aperture: Aperture, smoothing: float | None, count: int) -> Covariance:
+    """Return the covariance for so many sources, averaged over sub-arrays where it shows fewer: they are coherent."""
+    made = covariance(data, aperture, smoothing)
+    if smoothing is not None or aperture.table is None or len(data) < data.shape[1] or source_number(made) >= count:
+        return made
+    return covariance(data, aperture, SUB_ARRAY)
 
 
 def estimate(data: Complexes, aperture: Aperture, method: str, count: int, made: Covariance | None = None) -> Floats:

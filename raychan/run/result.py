@@ -84,7 +84,7 @@ class Explanation:
     folded: bool = False
     """Whether the leading chain is ambiguities away from where the map shows it, or mirrored by real sampling."""
     true_range: float = math.nan
-    """Range of the leading chain [m], mid frame; NaN where unknown."""
+    """Range of the leading chain [m], the mean over its paths by their power, mid frame; NaN where unknown."""
     true_rate: float = math.nan
     """Its range rate [m/s]; NaN where unknown."""
     reciprocity_db: float = 0.0
@@ -121,7 +121,9 @@ class ExplainedDetections(Detections):
     error_db: Floats = column("n", unit="dB", doc="stated error of the power; NaN where not converged", finite=False)
     converged: NDArray[np.bool_] = column("n", np.bool_, doc="whether the error is a figure")
     folded: NDArray[np.bool_] = column("n", np.bool_, doc="whether the echo is not where the map shows it")
-    true_range: Floats = column("n", unit="m", doc="range of the leading chain; NaN where unknown", finite=False)
+    true_range: Floats = column(
+        "n", unit="m", doc="mean range of the leading chain by power; NaN where unknown", finite=False
+    )
     true_rate: Floats = column("n", unit="m/s", doc="range rate of the leading chain; NaN where unknown", finite=False)
 
     @classmethod

@@ -33,8 +33,8 @@ def unsmoothed(aperture: Aperture, radar: Radar) -> list[str]:
         return []
     return [
         f"processing.doa = '{asked}': a cell is one snapshot, and the elements fill no uniform line or rectangle over "
-        "whose parts it could be averaged (spatial smoothing): directions and levels of two echoes in a cell are not "
-        "to be trusted; 'bartlett' tells those a beam width apart"
+        "whose parts it could be averaged (spatial smoothing): directions and levels of echoes in a cell less than "
+        "a beam width apart are not to be trusted"
     ]
 
 

@@ -174,6 +174,18 @@ def test_smoothing_restores_the_rank_that_coherent_echoes_lack():
     assert np.linalg.matrix_rank(covariance(data, Aperture(line(8), 1.0)).matrix, tol=1e-9) == 2
 
 
+@pytest.mark.parametrize("method", ["capon", "music", "esprit"])
+@pytest.mark.parametrize("sources", [3, None])
+def test_three_coherent_echoes_in_many_snapshots_are_found_as_in_few(method, sources):
+    towards = np.array([-35.0, 0.0, 25.0])
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        phase = np.exp(2j * np.pi * (rng.random(3) + rng.random((200, 1))))
+        data = 20.0 * phase @ Aperture(line(10), 1.0).steering(cosines(np.radians(towards))) + noise(rng, 200, 10)
+        found = doa(data, line(10), 1.0, method, sources)
+        assert np.degrees(np.sort(found.azimuth)) == pytest.approx(towards, abs=0.2), seed
+
+
 @pytest.mark.parametrize(
     ("change", "match"),
     [
