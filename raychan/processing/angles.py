@@ -8,7 +8,6 @@ transmitters echoes may be folded differently: each is a wave in what the slots 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,98 +15,20 @@ from numpy.typing import NDArray
 
 from raychan.processing.cell_echoes import CellEchoes
 from raychan.processing.doa import amplitudes, estimate
-from raychan.processing.near_field import NearAperture
 from raychan.processing.rivals import Judge, nearest
+from raychan.processing.scan import Scan
 from raychan.processing.slots import LONE, Slots
-from raychan.radar.aperture import Aperture
-from raychan.radar.measured import beside_line
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complexfloating[Any, Any]]
 
 _MOST = 8  # echoes in a cell
-_FLOOR = 1e-4  # of a cell's strongest echo: what a wave that is no plane one to rounding and side lobes leaves
 _TOLD_BY_LINES, _TOLD_BY_PLANES = 1.0, 0.75
 """Beam widths: echoes farther apart are told apart by Bartlett's beams. Of 120 pairs 0.3 to 1.5 of them apart before
 rectangles 11 are lost so without a word, of 1.0 28, and no run has more echoes than there are."""
 _APART = 0.05  # beam widths: nearer echoes share their power at the noise's whim (not measured)
 _ROUNDS = 20  # of seeking the echoes of different folds by turns (not measured)
 _STILL = 1e-4  # beam widths: echoes of different folds that move less have arrived (not measured)
-_AWAY = (1.0, 2.0)
-"""Times a cell's distance: from there waves come of what scatters, and of what mirrors the radar."""
-_OFF, _OFF_CELLS = 0.02, 0.05  # of the distance, and range cells: by which a source may stand off it (not measured)
-_SAFETY = 4.0  # on the power of a bent or uneven wave that a plane one cannot fit (not measured)
-
-
-@dataclass(frozen=True, eq=False)
-class Scan:
-    """How directions are sought."""
-
-    aperture: Aperture
-    method: str
-    range_resolution: float
-    """[m]"""
-    parts: tuple[Floats, ...] = ()
-    """Places (a, 3) [m] of each element's receiver and transmitter, by which waves are curved; none: all are plane."""
-    known: bool = False
-    """Whether waves are curved as the aperture takes them to be."""
-
-    def fronts(self, distance: float) -> list[Scan]:
-        """Return how directions in a cell at a distance [m] are sought: in the near field as of spherical waves from
-        there and, as of mirrors, from twice as far, and last as of plane waves."""
-        if not self.parts or self.method != "bartlett" or distance <= 0.0 or self._curved(distance) <= _FLOOR:
-            return [self]
-        own = self.aperture
-        near = [NearAperture.of(own, self.parts, x * distance) for x in _AWAY]
-        return [replace(self, aperture=x, known=True) for x in [*near, own]]
-
-    def _curved(self, distance: Any) -> Any:
-        """Return the share of echoes' power (n,), at distances (n,) [m], that is no plane wave as theirs is curved, an
-        upper estimate; of those known to be curved so but for some."""
-        extent = np.ptp(self.aperture.elements, axis=0)
-        bend = 2.0 * np.pi / self.aperture.wavelength * float(extent @ extent) / (8.0 * np.maximum(distance, 1e-3))
-        if self.known:
-            bend = bend * np.minimum(1.0, _OFF + _OFF_CELLS * self.range_resolution / distance)
-        return _SAFETY * 4.0 / 45.0 * bend**2
-
-    def misfit(self, directions: Floats, distances: Floats) -> Floats:
-        """Return the share of echoes' power (n,) that one plane wave in one range cell cannot fit, an upper estimate.
-
-        Args: directions, cosines (n, 2); distances (n,) [m].
-        Three causes: the element farthest out sees the echo earlier by x range cells, on the slope of the window's
-        response (at most 2 x of the amplitude; of 300 lone echoes none leaves over an eighth of that power); and the
-        wave is curved, by the phase k D^2 / 8 r at the rim, of whose power 4/45 is left by the best plane (integral of
-        the parabola less its mean); and of a line that spreads a little beside itself beams are those of a straight
-        one.
-        """
-        extent = np.ptp(self.aperture.elements, axis=0)
-        early = 0.25 * (np.abs(directions) @ extent[1:]) / self.range_resolution
-        # Elements nearer to the source hold more of its wave.
-        uneven = self.known * 0.5 * (np.abs(directions) @ extent[1:]) / np.maximum(distances, 1e-3)
-        share = _FLOOR + self._beside + ((2.0 * early) ** 2 + _SAFETY * uneven**2) / 3.0 + self._curved(distances)
-        return np.asarray(np.minimum(1.0, share))
-
-    @cached_property
-    def _beside(self) -> float:
-        """Share of an echo's power that a beam reads, at most, of what places beside a line make of its wave."""
-        scans, places = self.aperture.scans, self.aperture.elements[:, 1:] / self.aperture.wavelength
-        if sum(scans) != 1:
-            return 0.0
-        axis = 0 if scans[0] else 1
-        return beside_line(places[:, axis], places[:, 1 - axis], 1.0 / float(self.aperture.beamwidth[axis]))
-
-    def conventional(self, direction: Floats) -> Complexes:
-        """Return the weights (s, a) of beams towards cosines (2,) and half a beam width to all sides of it."""
-        axes = [(0.0, -0.5 * w, 0.5 * w) if np.isfinite(w) else (0.0,) for w in self.aperture.beamwidth]
-        shifts = np.stack([x.ravel() for x in np.meshgrid(*axes)], axis=1)
-        return np.asarray(self.aperture.steering(direction + shifts).conj() / len(self.aperture.elements))
-
-
-def through(weights: Complexes, waves: Complexes) -> Floats:
-    """Return the greatest power (n,) that beams of weights (b, a) let through of echoes, over that in their own.
-
-    Args: waves (h, n, a) of the echoes in the antennas that the beams weigh, each in parts that may be in phase."""
-    return np.asarray(np.abs(weights @ waves.transpose(0, 2, 1)).sum(axis=0).max(axis=0) ** 2)
 
 
 def echoes_in(

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.processing.angles import Scan, echoes_in, through
+from raychan.processing.angles import echoes_in
 from raychan.processing.cell_echoes import CellEchoes
 from raychan.processing.cfar import Grid
 from raychan.processing.fold_beside import judged_beside
@@ -17,6 +17,7 @@ from raychan.processing.found import Echoes, Peaks, Row
 from raychan.processing.line_lobes import LineLobes
 from raychan.processing.peak_shape import PeakShape
 from raychan.processing.peaks import MARGIN, SideLobes, together
+from raychan.processing.scan import Scan, through
 from raychan.processing.slots import LONE, Slots
 from raychan.processing.staggered import CLEAR, ResolvedMap, noise_of
 from raychan.records import RangeDoppler

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.processing import twins
-from raychan.processing.angles import Scan
 from raychan.processing.beams import BeamBank
 from raychan.processing.cell_split import Splitter
 from raychan.processing.cfar import GUARD, TRAIN, Grid, Training, bias, factor, training
@@ -19,6 +18,7 @@ from raychan.processing.line_lobes import LineLobes
 from raychan.processing.near_field import parts_of
 from raychan.processing.peak_shape import PeakShape
 from raychan.processing.peaks import SideLobes
+from raychan.processing.scan import Scan
 from raychan.processing.staggered import ResolvedMap
 from raychan.radar.aperture import Aperture
 from raychan.radar.waveform import OwnWaveform, Waveform

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from support.arrays import noise, plane
 
-from raychan.processing.angles import Scan, echoes_in
+from raychan.processing.angles import echoes_in
+from raychan.processing.scan import Scan
 from raychan.radar.aperture import Aperture
 
 NOISE = 1e-5

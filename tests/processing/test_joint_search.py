@@ -9,11 +9,12 @@ import pytest
 from support.arrays import noise
 from support.echoes import SMALL, echoes, make_radar
 
-from raychan.processing.angles import Scan, echoes_in
+from raychan.processing.angles import echoes_in
 from raychan.processing.detection import detect
 from raychan.processing.doa import by_turns
 from raychan.processing.joint_search import explained
 from raychan.processing.range_doppler import range_doppler
+from raychan.processing.scan import Scan
 from raychan.radar.aperture import Aperture
 from raychan.signal.baseband import synthesize
 from raychan.units import C0

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from support.arrays import noise
 
-from raychan.processing.angles import Scan, echoes_in
+from raychan.processing.angles import echoes_in
 from raychan.processing.cell_echoes import CellEchoes
+from raychan.processing.scan import Scan
 from raychan.radar.aperture import Aperture
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from raychan.processing.angles import Scan, echoes_in
+from raychan.processing.angles import echoes_in
+from raychan.processing.scan import Scan
 from raychan.radar.aperture import Aperture
 
 LAMBDA = 3.9e-3
