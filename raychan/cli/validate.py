@@ -94,8 +94,9 @@ def _say(done: Validation, out: Path) -> None:
     heads = ("", "table or claim", "agree", "differ", "not testable", "verdict")
     screen.print(show.table("Validation", heads, rows, left=(0, 1, 5)))
     counts = [sum(c.verdict == v for c in done.checks) for v in (AGREES, DIFFERS, UNTESTABLE)]
+    listed = " as listed" if counts[1] and not done.problems else ""
     screen.print(
-        f"{len(done.checks)} figures: {counts[0]} agree, {counts[1]} differ, {counts[2]} cannot be tested as printed; "
-        f"{done.seconds:.0f} s; full report: {out / 'report.md'}",
+        f"{len(done.checks)} figures: {counts[0]} agree, {counts[1]} differ{listed}, {counts[2]} cannot be "
+        f"tested as printed; {done.seconds:.0f} s; full report: {out / 'report.md'}",
         soft_wrap=True,
     )

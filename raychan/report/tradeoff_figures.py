@@ -99,7 +99,7 @@ def _lines(axes: Any, rows: Sequence[Row], key: str) -> None:
     axes.axhspan(_LOW / 2, rows[0].truth_db, color="#eeeeee", lw=0, zorder=0, label="below the error of the reference")
     axes.set(xscale="log", yscale="log", ylim=(_LOW * 0.8, _HIGH * 1.3))
     axes.set_xlim(*_span([max(float(getattr(r, key)), 1e-5) for r in rows]))
-    axes.set_yticks(_TICKS, [f"{t:g}" for t in _TICKS])
+    axes.set_yticks(_TICKS, [f"≤ {t:g}" if t == _LOW else f"{t:g}" for t in _TICKS])
     axes.minorticks_off()
     axes.grid(alpha=0.3, lw=0.5)
 

@@ -85,7 +85,8 @@ class Body:
     def geometry(self) -> Mesh:
         """The mesh in the body's own frame."""
         if (self.mesh is None) == (self.shape is None):
-            raise SceneError("keys do not fit together", key=self.name, allowed="either shape or mesh")
+            wrong = "neither shape nor mesh is given" if self.mesh is None else "keys do not fit together"
+            raise SceneError(wrong, key=self.name, allowed="either shape or mesh")
         try:
             if isinstance(self.mesh, (str, Path)):
                 try:

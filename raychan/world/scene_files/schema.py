@@ -79,7 +79,7 @@ class WaveformTable(Table):
     @model_validator(mode="after")
     def _fits(self) -> WaveformTable:
         if self.repetition_us is not None and self.repetition_us < self.chirp_us * (1.0 - 1e-9):
-            raise ValueError("repetition_us not shorter than chirp_us")
+            raise ValueError(f"repetition_us not shorter than chirp_us, {self.chirp_us:g}")
         if self.stagger_us is not None:
             if self.repetition_us is not None or min(self.stagger_us) < self.chirp_us * (1.0 - 1e-9):
                 raise ValueError("either repetition_us or stagger_us, none of it shorter than chirp_us")
@@ -254,7 +254,7 @@ class PlacedBodyTable(Table):
     @model_validator(mode="after")
     def _shape_or_mesh(self) -> PlacedBodyTable:
         if (self.shape is None) == (self.mesh is None):
-            raise ValueError("either shape or mesh")
+            raise ValueError("either shape or mesh" + (", here both" if self.shape else ", here neither"))
         return self
 
 
