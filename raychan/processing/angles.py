@@ -42,7 +42,9 @@ def echoes_in(
     Bartlett's beams those of one fold only a beam width apart, or three quarters of it where both angles are measured.
     """
     data, most = snapshot[None, :].astype(np.complex128), min(_MOST, len(scan.aperture.elements) // 2)
-    first, *others = (_Cell(data, front, slots, least, distance, noise) for front in scan.fronts(distance))
+    mean = float((np.abs(data) ** 2).sum()) / len(scan.aperture.elements)
+    fronts = scan.fronts(distance, least / max(mean, 1e-300))
+    first, *others = (_Cell(data, front, slots, least, distance, noise) for front in fronts)
     best = first.echoes(most)
     for cell in others:
         # Where several explain all, fewer must; of lone ones the stronger.

@@ -17,6 +17,7 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complexfloating[Any, Any]]
 
 _FLOOR = 1e-4  # of a cell's strongest echo: what a wave that is no plane one to rounding and side lobes leaves
+_TELLS = 0.5  # of the least power of an echo: curvature that leaves less is not looked at (not measured)
 _AWAY = (1.0, 2.0)
 """Times a cell's distance: from there waves come of what scatters, and of what mirrors the radar."""
 _OFF, _OFF_CELLS = 0.02, 0.05  # of the distance, and range cells: by which a source may stand off it (not measured)
@@ -36,10 +37,13 @@ class Scan:
     known: bool = False
     """Whether waves are curved as the aperture takes them to be."""
 
-    def fronts(self, distance: float) -> list[Scan]:
+    def fronts(self, distance: float, noise: float) -> list[Scan]:
         """Return how directions in a cell at a distance [m] are sought: in the near field as of spherical waves from
-        there and, as of mirrors, from twice as far, and last as of plane waves."""
-        if not self.parts or self.method != "bartlett" or distance <= 0.0 or self._curved(distance) <= _FLOOR:
+        there and, as of mirrors, from twice as far, and last as of plane waves. Args: noise, share of the cell's power
+        below which an echo is none: what curvature leaves far below it tells nothing."""
+        if not self.parts or self.method != "bartlett" or distance <= 0.0:
+            return [self]
+        if self._curved(distance) <= max(_FLOOR, _TELLS * noise):
             return [self]
         own = self.aperture
         near = [NearAperture.of(own, self.parts, x * distance) for x in _AWAY]

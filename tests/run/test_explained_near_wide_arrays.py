@@ -57,18 +57,21 @@ def test_what_paths_give_spreads_to_each_element(elements, width, away, azimuth,
     assert db(why.predicted) == pytest.approx(db(why.power), abs=0.01)
 
 
-def test_echoes_that_may_be_parts_of_one_near_wave_are_ambiguous():
-    """A wave from 1.6 m is curved by five radians over 0.37 m: its peak splits into two beams."""
+@pytest.mark.parametrize(("doa", "count"), [("bartlett", 1), ("music", 2)])
+def test_a_near_wave_is_one_echo_as_spherical_and_ambiguous_parts_as_plane(doa, count):
+    """A wave from 1.6 m is curved by five radians over 0.37 m: its peak splits into two beams of plane waves."""
     wave = rc.Waveform(carrier=24e9, bandwidth=150e6, chirp_duration=30e-6, n_chirps=8, n_samples=48)
     line = rc.uniform_array(60, 0.5 * 299_792_458.0 / wave.middle)
     radar = rc.Radar(waveform=wave, position=(0.0, 0.0, 1.0), noise=False, elements=line)
 
     def seen(away):
         ball = rc.Body(name="ball", shape="sphere", params={"radius": 0.06}, position=(away, 0.1 * away, 1.0))
-        return rc.simulate(rc.Scene(bodies=[ball], radar=radar, model={"max_bounces": 1})).detections
+        scene = rc.Scene(bodies=[ball], radar=radar, model={"max_bounces": 1}, processing=rc.Processing(doa=doa))
+        return rc.simulate(scene).detections
 
     near, far = seen(1.6), seen(80.0)
-    assert len(near.range) == 2 and near.ambiguous.all()
+    assert len(near.range) == count and (near.ambiguous == (count > 1)).all()
+    assert count > 1 or near.azimuth[0] == pytest.approx(np.arctan2(0.1, 1.0), abs=0.01)
     assert len(far.range) == 1 and not far.ambiguous.any()
 
 
