@@ -154,7 +154,10 @@ def detect(
     towards = bank.directions[bank.towards(map.spectrum, cells)]
     peaks = Peaks(cells, shift, power, noise, shown, bar.of_beam(bank, local, pfa), smear, towards)
     parts = parts_of(aperture.elements, senders)
-    scan, coherent = Scan(aperture, array.doa, map.range_resolution, parts), array.beams == "coherent"
+    # By real samples ranges beyond the map come back in it as images, whose waves are curved the other way.
+    beyond = np.inf if lobes.mirrors else map.unambiguous_range
+    scan = Scan(aperture, array.doa, map.range_resolution, parts, beyond=beyond)
+    coherent = array.beams == "coherent"
     echoes = Splitter(map, grid, lobes, lines, shape, scan, seen.receiver_noise, coherent).split(peaks)
     loud = db(echoes.power / np.maximum(echoes.noise, _TINY)) >= min_snr_db
     return _reported(map, grid, echoes.take(loud), ego_speed, aperture, seen.looks, shape.wraps)

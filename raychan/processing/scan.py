@@ -36,17 +36,21 @@ class Scan:
     """Places (a, 3) [m] of each element's receiver and transmitter, by which waves are curved; none: all are plane."""
     known: bool = False
     """Whether waves are curved as the aperture takes them to be."""
+    beyond: float = np.inf
+    """By how much [m] farther than shown an echo may be, folded into the map."""
 
     def fronts(self, distance: float, noise: float) -> list[Scan]:
         """Return how directions in a cell at a distance [m] are sought: in the near field as of spherical waves from
-        there and, as of mirrors, from twice as far, and last as of plane waves. Args: noise, share of the cell's power
-        below which an echo is none: what curvature leaves far below it tells nothing."""
+        there, as of mirrors from twice as far, from where the cell's range is folded from, and last as of plane waves.
+        Args: noise, share of the cell's power below which an echo is none: what curvature leaves far below it tells
+        nothing."""
         if not self.parts or self.method != "bartlett" or distance <= 0.0:
             return [self]
-        if self._curved(distance) <= max(_FLOOR, _TELLS * noise):
+        least = max(_FLOOR, _TELLS * noise)
+        if self._curved(distance) <= least:
             return [self]
-        own = self.aperture
-        near = [NearAperture.of(own, self.parts, x * distance) for x in _AWAY]
+        own, away, beyond = self.aperture, [x * distance for x in _AWAY], distance + self.beyond
+        near = [NearAperture.of(own, self.parts, x) for x in away + [beyond] * bool(self._curved(beyond) > least)]
         return [replace(self, aperture=x, known=True) for x in [*near, own]]
 
     def _curved(self, distance: Any) -> Any:

@@ -8,20 +8,27 @@ import pytest
 import raychan as rc
 
 AHEAD = 40.0  # m
-WAVE = {"bandwidth_mhz": 300.0, "chirp_us": 40.0, "repetition_us": 50.0, "chirps": 512, "samples": 64}
+WAVE = {"bandwidth_mhz": 300.0, "chirp_us": 40.0, "repetition_us": 50.0, "chirps": 512, "samples": 128}
 
 
-def scene(rate: float, width: float = 0.24):
+def scene(rate: float, width: float = 0.24, **wave):
     """Return a scene of a target far ahead that crosses before a line of elements so wide [m]."""
     line = [[0.0, width * (k / 15 - 0.5), 0.0] for k in range(16)]
     target = {"name": "target", "shape": "sphere", "params": {"radius": 0.005}, "rcs_dbsm": 40.0}
     target |= {"position": [AHEAD, 0.0, 0.5], "velocity_mps": [0.0, rate, 0.0]}
-    radar = {"position": [0.0, 0.0, 0.5], "elements_mm": [[1e3 * x for x in e] for e in line], "waveform": WAVE}
+    radar = {"position": [0.0, 0.0, 0.5], "elements_mm": [[1e3 * x for x in e] for e in line], "waveform": WAVE | wave}
     return rc.Scene.from_dict({"radar": radar, "bodies": [target], "model": {"max_bounces": 1}})
 
 
 def lines(result) -> list[str]:
     return [line for line in result.warnings if "rates that differ over the elements" in line]
+
+
+def test_a_near_echo_from_beyond_the_map_has_its_direction():
+    """It shows at 8 m: as from there it would be 29 degrees aside."""
+    found = rc.simulate(scene(0.0, samples=64)).detections
+    assert found.range == pytest.approx([8.0], abs=0.1)
+    assert np.degrees(found.azimuth) == pytest.approx([0.0], abs=0.1)
 
 
 def test_a_line_tells_by_how_many_cells_rates_differ_and_what_a_beam_loses(tmp_path):
