@@ -153,14 +153,17 @@ def detect(
         return _reported(map, grid, Found(cells, shift, power, noise).take(kept), ego_speed, wraps=shape.wraps)
     towards = bank.directions[bank.towards(map.spectrum, cells)]
     peaks = Peaks(cells, shift, power, noise, shown, bar.of_beam(bank, local, pfa), smear, towards)
-    parts = parts_of(aperture.elements, senders)
-    # By real samples ranges beyond the map come back in it as images, whose waves are curved the other way.
-    beyond = np.inf if lobes.mirrors else map.unambiguous_range
-    scan = Scan(aperture, array.doa, map.range_resolution, parts, beyond=beyond)
-    coherent = array.beams == "coherent"
+    scan, coherent = _scan(map, aperture, senders, array.doa, lobes.mirrors), array.beams == "coherent"
     echoes = Splitter(map, grid, lobes, lines, shape, scan, seen.receiver_noise, coherent).split(peaks)
     loud = db(echoes.power / np.maximum(echoes.noise, _TINY)) >= min_snr_db
     return _reported(map, grid, echoes.take(loud), ego_speed, aperture, seen.looks, shape.wraps)
+
+
+def _scan(map: RangeDoppler, aperture: Aperture, senders: Floats | None, method: str, mirrors: bool) -> Scan:
+    """Return how directions are sought. Args: senders (t, 3) [m] of virtual elements; mirrors, by real samples."""
+    # By these ranges beyond the map come back in it as images, whose waves are curved the other way.
+    beyond = np.inf if mirrors else map.unambiguous_range
+    return Scan(aperture, method, map.range_resolution, parts_of(aperture.elements, senders), beyond=beyond)
 
 
 def least_power(
