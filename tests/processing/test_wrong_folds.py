@@ -36,7 +36,7 @@ def wrong(radar, snr: float) -> float:
     return float(np.mean(off))
 
 
-@pytest.mark.parametrize("stagger", [(40.0, 50.0), (31.0, 34.0, 38.0), (30.0, 30.5)])
+@pytest.mark.parametrize("stagger", [(31.0, 34.0, 38.0), (30.0, 30.5)])
 def test_from_the_snr_told_on_a_wrong_fold_is_rarer_than_1_in_100(stagger):
     radar = radar_of(*stagger)
     told = least_snr(radar)

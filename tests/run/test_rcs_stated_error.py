@@ -80,11 +80,11 @@ def random_case(rng, i):
 
 
 def test_the_true_error_lies_within_the_stated_one_and_not_far_within(monkeypatch):
-    """140 random cases, 95 % of them; the ratio where there is an error to speak of. All know their normals (what
+    """98 random cases, 95 % of them; the ratio where there is an error to speak of. All know their normals (what
     a mesh leaves open is judged in test_mesh_error), and where the truth is physical optics no wave creeps."""
     rng = np.random.default_rng(11)
     true, stated = [], []
-    for i in range(140):
+    for i in range(98):
         mesh, material, az, el, d, exact = random_case(rng, i)
         # Physical optics is the truth here; nobody wants the error of creeping waves left out, so no argument does it.
         with monkeypatch.context() as m:
@@ -97,7 +97,7 @@ def test_the_true_error_lies_within_the_stated_one_and_not_far_within(monkeypatc
     known = np.isfinite(s)
     assert known.mean() > 0.98
     told = known & (e > 1e-3)
-    assert told.sum() > 40
+    assert told.sum() > 28
     beyond = known & (e > s)
     assert beyond.sum() <= 0.05 * known.sum(), f"beyond: {np.round(np.column_stack([e, s])[beyond], 4)}"
     # The median was 3.9 until corners of footprints had fields of their own: true errors of near lossy plates fell by
