@@ -10,7 +10,7 @@ BIN := $(VENV)/bin
 # bounds checked: make test-bounds. No test that is skipped with bounds checked is among them. Less optimised code
 # is compiled in a seventh less time, and runs these as fast.
 BOUNDS := $(addprefix tests/,em house/test_bounds.py compile/test_code_cache.py processing/test_range_doppler.py processing/test_fold_kernels.py \
-	processing/test_climb_kernels.py processing/test_rival_sets.py signal/test_arrays.py signal/test_drifting_sources.py signal/test_fronts.py signal/test_nufft.py \
+	processing/test_climb_kernels.py processing/test_rival_sets.py processing/test_near_field.py signal/test_arrays.py signal/test_drifting_sources.py signal/test_fronts.py signal/test_nufft.py \
 	world/test_shapes.py world/test_ray_caster.py world/test_contractions.py run/test_provenance.py run/test_preview_bounds.py channel/test_corner_places.py channel/test_filon.py \
 	channel/test_layers_over_a_footprint.py channel/test_fields_over_a_footprint.py tracing/test_landing_on_curves.py \
 	run/test_narrow_beams.py tracing/test_ways.py \

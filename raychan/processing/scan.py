@@ -17,7 +17,9 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complexfloating[Any, Any]]
 
 _FLOOR = 1e-4  # of a cell's strongest echo: what a wave that is no plane one to rounding and side lobes leaves
-_TELLS = 0.5  # of the least power of an echo: curvature that leaves less is not looked at (not measured)
+_TELLS = 0.5
+"""Of the least power of an echo: curvature that leaves less is not looked at. With 0.1 as many of 109 near pairs are
+found, and a 2 x 8 array over clutter takes 18 s in place of 15 (27 with 0)."""
 _AWAY = (1.0, 2.0)
 """Times a cell's distance: from there waves come of what scatters, and of what mirrors the radar."""
 _OFF, _OFF_CELLS = 0.02, 0.05  # of the distance, and range cells: by which a source may stand off it (not measured)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -66,9 +65,9 @@ def joined_or_split(quick: bool) -> Outcome:
 
     Boxes that turn no face to the radar return next to nothing, which is not known: they are passed over."""
     rng = np.random.default_rng(11)
-    rows = list[Row]()
-    for i in itertools.count():
-        if len(rows) == (4 if quick else 10):
+    rows, count = list[Row](), 4 if quick else 10
+    for i in range(3 * count):
+        if len(rows) == count:
             break
         at = np.array([rng.uniform(5.0, 7.0), *rng.uniform(-0.4, 0.4, 2)])
         turn = rotation(rng.uniform(-np.pi, np.pi), *rng.uniform(-0.15, 0.15, 2))
