@@ -141,8 +141,11 @@ def rcs(
             _sweep(mesh, frequency_ghz * 1e9, grid[0].ravel(), grid[1].ravel(), settings, tell, parts)
         found = _joined(parts)
         table = rows(grid[0].ravel(), grid[1].ravel(), found)
-        _written(out, plot, (az, el), table, found, title, polar)
-        show.console().print(table_of(title, table))
+        try:
+            _written(out, plot, (az, el), table, found, title, polar)
+        finally:
+            # Where it cannot be written, what was computed is on the screen at least.
+            show.console().print(table_of(title, table))
         if shape is None and source:
             from raychan.world.mesh_files.mesh_io import oddities
 
@@ -160,10 +163,12 @@ def rcs(
 def _written(
     out: Path | None, plot: Path | None, angles: tuple[Any, Any], table: list[Any], found: Rcs, title: str, polar: bool
 ) -> None:
-    """Write the table and the figure that are asked for."""
+    """Write the table and the figure that are asked for; the table alone where the figure cannot be written.
+
+    Raises: StoreError where either cannot."""
     import numpy as np
 
-    from raychan.run.files.output import write_together
+    from raychan.run.files.output import PictureError, StoreError, write_together, write_whole
 
     files: dict[Path, bytes | memoryview] = {}
     if out is not None:
@@ -175,7 +180,13 @@ def _written(
         shape = len(el), len(az)
         dbsm = np.array([row[3] for row in table]).reshape(shape)
         files[plot] = rcs_picture(az, el, dbsm, found.error_db.reshape(shape), title, plot.suffix, polar)
-    write_together(files)
+    try:
+        write_together(files)
+    except StoreError as error:
+        if len(files) == 1 or out is None:
+            raise
+        write_whole(out, files[out])
+        raise PictureError(f"{error}; the table is in {out}") from error
 
 
 def _target(

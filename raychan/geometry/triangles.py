@@ -71,9 +71,11 @@ def edge_curvature(p, q, m, n):  # type: ignore[no-untyped-def]
     here, there = dot(d, m), -dot(d, n)
     s, t = (here - a * there) / det, (there - a * here) / det
     c = s * m[0] + t * n[0], s * m[1] + t * n[1], s * m[2] + t * n[2]
-    # On a circle |c| is half the chord times the turn; normals that contradict their edge (S-shape) leave it straight.
+    # On a circle |c| is half the chord times the turn. Normals that contradict their edge (S-shape), as rounded corners
+    # of a fine mesh do, ask for more, along the edge: there it bends as much as both ends do in the mean.
     if not math.sqrt(dot(c, c)) < math.sqrt(max(2.0 * (1.0 - a), 0.0)) * math.sqrt(dot(d, d)):
-        return 0.0, 0.0, 0.0
+        s = 0.5 * (here + there) / (1.0 + a) if a > 0.0 else 0.0
+        c = s * (m[0] + n[0]), s * (m[1] + n[1]), s * (m[2] + n[2])
     return c
 
 

@@ -48,9 +48,9 @@ class Rcs:
     amplitude: Complexes
     """Scattering matrix (..., 2, 2) [m], rows receive V, H, columns transmit: sigma = 4 pi |amplitude|^2."""
     further_db: Floats
-    """Change [dB] if a bounce beyond max_bounces brought as much as the last allowed one, or, where that brings
-    nothing, as much as a coarse launch finds: an estimate that is not in error_db; 0 for a convex body, NaN where
-    max_bounces is 1 and the body is not convex."""
+    """Change [dB] by a bounce beyond max_bounces, an estimate that is not in error_db: what one brings as much as the
+    last allowed one, where that is within the tolerance, else what a coarse launch finds; 0 for a convex body, NaN
+    where max_bounces is 1 and the body is not convex."""
     edges_db: Floats
     """Change [dB] that fringe fields of edges may bring, which physical optics leaves out: an estimate for perfect
     conductors that is not in error_db; 0 without edges, NaN where they may bring as much as the rest."""

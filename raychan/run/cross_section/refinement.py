@@ -276,18 +276,25 @@ def _typical_edge(geometry: Geometry) -> float:
 
 
 def _further(case: Case, rule: Refinement, by_bounce: Complexes) -> float:
-    """Return the change [dB] of the level if one more bounce brought as much as the last of those given.
+    """Return the change [dB] of the level by one more bounce than is allowed.
 
-    Where the last one brings nothing it tells nothing of the next: seen along its axis, a corner of three faces returns
-    by three bounces and not by two. There a launch by the given rule, with one more bounce, tells it."""
+    The next bounce brings as much as the last at most, by estimate; where the last brings nothing, it tells nothing of
+    the next: seen along its axis, a corner of three faces returns by three bounces and not by two. There, and where as
+    much as the last counts, a launch by the given rule, with one more bounce, tells it."""
     if case.geometry.convex_alone:
         return 0.0
     whole, last = abs(by_bounce.sum()), abs(by_bounce[-1])
     if len(by_bounce) == 1 or not whole:
         return np.nan
-    if last <= _COUNTS * np.abs(by_bounce).max() and case.bounces < BOUNCES.high:
+    open_, nothing = _change_db(last, whole) > case.tolerance_db, last <= _COUNTS * np.abs(by_bounce).max()
+    if (open_ or nothing) and case.bounces < BOUNCES.high:
         last = abs(replace(case, bounces=case.bounces + 1).launch(case.geometry, rule)[-1, case.row, case.col])
-    return float(20.0 * np.log10(1.0 + last / whole))
+    return _change_db(last, whole)
+
+
+def _change_db(more: float, whole: float) -> float:
+    """Return the change [dB] of an amplitude by another in phase with it."""
+    return float(20.0 * np.log10(1.0 + more / whole))
 
 
 def _most_tubes(step: int, max_rays: int) -> int:
