@@ -12,7 +12,8 @@ from raychan.blas import on_one_blas_thread
 from raychan.channel.mesh_error import mesh_error
 from raychan.poses import direction
 from raychan.radar.declared import check_type, reals
-from raychan.run.cross_section.refinement import Case, Value, refined
+from raychan.run.cross_section.case import Case, Value
+from raychan.run.cross_section.refinement import refined
 from raychan.run.cross_section.single_body import facets_of, mesh_of
 from raychan.scalars import plain, shown
 from raychan.tracing.legs import Leg

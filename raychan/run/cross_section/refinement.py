@@ -8,23 +8,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.error import COVER, stated_error
-from raychan.channel.mesh_error import MeshError, creeping, has_edges
+from raychan.channel.mesh_error import creeping, has_edges
 from raychan.channel.terminator_error import TERMINATOR, terminator_error
+from raychan.run.cross_section.case import COUNTS, Case, Value, further_db
 from raychan.run.cross_section.doubt import Doubt
 from raychan.run.cross_section.edges import edges_db
 from raychan.run.cross_section.scattering import BodyLaunch, BySource, rounding
 from raychan.run.cross_section.source_sums import SourceSums
-from raychan.tracing.legs import Leg
 from raychan.tracing.tubes import Refinement
 from raychan.units import C0
 from raychan.world.geometry import Geometry
-from raychan.world.limits import BOUNCES
 
 Complexes = NDArray[np.complex128]
 
@@ -43,54 +42,12 @@ _TUBES = 30_000  # tubes that a launch may always subdivide, if max_rays allow
 _NULL = 1e-4  # of the strongest polarisation, -80 dB: a change below it does not count
 _ROUNDING = 16.0  # times what rounding may leave: below it is none. Amplitudes that are zero (the other polarisation,
 # edges on, nulls; plates, boxes, corners, cylinder, sphere; 1 and 77 GHz; no command) are 0.04 times it at most
-_COUNTS = 1e-3  # of the strongest bounce, -60 dB: one below it does not count
 _LEFT = 0.3  # of the tolerance: what the last changes of sources that are not traced again may add up to; not measured
 _HALF = 0.5  # of the tolerance: launches within it are refined no further for what the mesh leaves open; not measured
 _OVER = 2.0  # times the rays left: what a launch that was expected to cost less may cast; not measured
 _JITTER = 0.2  # of an edge: how far cuts may lie off its middle, for lattices of their own; not measured
 _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)  # spreads numbered lattices evenly
 _GROWTH = 2.6  # rays of the next rule over those of all before it, about
-
-
-@dataclass(frozen=True)
-class Case:
-    """One cross-section to compute: a body, both legs, polarisation (rows V, H of receiver and transmitter), limits."""
-
-    geometry: Geometry
-    mesh_error: MeshError
-    leg: Leg
-    out: Leg
-    frequency: float
-    bounces: int
-    tolerance_db: float
-    max_rays: int
-    row: int
-    col: int
-
-    @property
-    def rays(self) -> int:
-        """Rays cast so far on the body and on the other surfaces that its mesh may stand for."""
-        return self.geometry.rays + self.mesh_error.rays
-
-    def launch(self, geometry: Geometry, rule: Refinement) -> Complexes:
-        """Return the scattering amplitudes (bounces, 2, 2) [m] of one launch."""
-        launch = BodyLaunch(geometry, (self.leg, self.out), self.frequency, self.bounces)
-        return launch.whole(rule).by_bounce(self.bounces)
-
-
-@dataclass(frozen=True)
-class Value:
-    """A cross-section: sigma [m^2], error [dB] and the part of it that more rays reduce (NaN: unknown), rays cast, most
-    bounces that counted, change [dB] by a further bounce, scattering matrix (2, 2) [m]."""
-
-    sigma: float
-    error_db: float
-    numerical_db: float
-    rays: int
-    bounces: int
-    further_db: float
-    edges_db: float
-    matrix: Complexes
 
 
 def refined(case: Case) -> Value:
@@ -103,8 +60,8 @@ def refined(case: Case) -> Value:
     sums, error_db, numerical_db = _launched(case, rules)
     amplitudes = sums.sums.by_bounce(case.bounces)
     by_bounce = amplitudes[:, case.row, case.col]
-    counted = np.flatnonzero(np.abs(by_bounce) > _COUNTS * np.abs(by_bounce).max(initial=0.0))
-    most, further = int(counted.max(initial=-1)) + 1, _further(case, rules[0], by_bounce)
+    counted = np.flatnonzero(np.abs(by_bounce) > COUNTS * np.abs(by_bounce).max(initial=0.0))
+    most, further = int(counted.max(initial=-1)) + 1, further_db(case, rules[0], by_bounce)
     matrix = amplitudes.sum(axis=0)
     left = rounding(case.geometry, (case.leg, case.out), case.frequency, sums.sums.amplitude)
     if abs(sums.value) <= _ROUNDING * left:
@@ -273,28 +230,6 @@ def _typical_edge(geometry: Geometry) -> float:
     order = np.argsort(longest)
     covered = np.cumsum(geometry.area[order])
     return float(longest[order][np.searchsorted(covered, 0.5 * covered[-1])])
-
-
-def _further(case: Case, rule: Refinement, by_bounce: Complexes) -> float:
-    """Return the change [dB] of the level by one more bounce than is allowed.
-
-    The next bounce brings as much as the last at most, by estimate; where the last brings nothing, it tells nothing of
-    the next: seen along its axis, a corner of three faces returns by three bounces and not by two. There, and where as
-    much as the last counts, a launch by the given rule, with one more bounce, tells it."""
-    if case.geometry.convex_alone:
-        return 0.0
-    whole, last = abs(by_bounce.sum()), abs(by_bounce[-1])
-    if len(by_bounce) == 1 or not whole:
-        return np.nan
-    open_, nothing = _change_db(last, whole) > case.tolerance_db, last <= _COUNTS * np.abs(by_bounce).max()
-    if (open_ or nothing) and case.bounces < BOUNCES.high:
-        last = abs(replace(case, bounces=case.bounces + 1).launch(case.geometry, rule)[-1, case.row, case.col])
-    return _change_db(last, whole)
-
-
-def _change_db(more: float, whole: float) -> float:
-    """Return the change [dB] of an amplitude by another in phase with it."""
-    return float(20.0 * np.log10(1.0 + more / whole))
 
 
 def _most_tubes(step: int, max_rays: int) -> int:

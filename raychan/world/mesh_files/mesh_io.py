@@ -185,12 +185,12 @@ def from_trimesh(source: Any, crease_deg: float = CREASE_DEG, matrix: Floats | N
     Args: matrix (3, 3) applied to all vertices; a reflection turns the faces with it.
     """
     pieces = _pieces(source)
-    m = np.eye(3) if matrix is None else np.asarray(matrix, float)
+    m = None if matrix is None else np.asarray(matrix, float)
     vertices, faces, part, base = [], [], [], 0
     for i, (_, v, f) in enumerate(pieces):
         _possible(v)
-        vertices.append(v @ m.T)
-        faces.append((f if np.linalg.det(m) > 0.0 else f[:, ::-1]) + base)
+        vertices.append(v if m is None else v @ m.T)
+        faces.append((f if m is None or np.linalg.det(m) > 0.0 else f[:, ::-1]) + base)
         part.append(np.full(len(f), i, np.int32))
         base += len(v)
     if not faces:

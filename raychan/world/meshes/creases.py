@@ -13,6 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.geometry.fold_shapes import bends, edge_lengths, outward
+from raychan.geometry.triangles import planes_of
 from raychan.world.meshes.mesh import Mesh, crease_angle
 from raychan.world.meshes.tessellation import rounded
 from raychan.world.meshes.topology import point_numbers
@@ -138,7 +140,7 @@ def _kept_folds(mesh: Mesh) -> _Folds:
         crease = crease_angle(mesh.crease_deg or 0.0)
         soft, hard = fold < crease, np.zeros(len(pair), bool)
         if mesh.crease_deg and len(pair):
-            hard = rounded(mesh.topology, mesh.corners, pair, _outward(mesh, pair) * fold, crease)
+            hard = rounded(mesh.topology, mesh.corners, pair, outward(*_facets(mesh), pair) * fold, crease)
         one, its = pair[soft], fold[soft]
         bent = its > _BEND
         uncertain = bent & _may_be_edges(mesh, one, np.where(bent, its, 0.0)) if bent.any() else None
@@ -172,20 +174,11 @@ def _all_folds(mesh: Mesh) -> tuple[Ints, Floats]:
     return pair, folds(mesh.vertices, mesh.faces, pair)
 
 
-def _outward(mesh: Mesh, pair: Ints) -> Floats:
-    """Return 1 (e,) where the facets of a pair make a convex fold, -1 where a concave one."""
-    c, (one, other) = mesh.corners, pair.T
-    a = c[one // 3]
-    normal = np.cross(a[:, 1] - a[:, 0], a[:, 2] - a[:, 0])
-    tip = c[other // 3, (other % 3 + 2) % 3] - c[other // 3, other % 3]
-    return np.where(np.einsum("ij,ij->i", normal, tip) > 0.0, -1.0, 1.0)
-
-
 def _regular(mesh: Mesh) -> Bools:
     """Return which facets (f,) are of smooth patches whose facets are even, as those of a regular tessellation are."""
     pair, fold = _smooth_folds(mesh)
     patch = components(pair // 3, len(mesh.faces))
-    weight = np.where(fold > _BEND, fold, 0.0) * np.linalg.norm(_spans(mesh, pair), axis=1)
+    weight = np.where(fold > _BEND, fold, 0.0) * edge_lengths(mesh.vertices, mesh.faces, pair)
     whole, uneven = (np.bincount(patch[pair[:, 0] // 3], w, len(patch)) for w in (weight, weight * _uneven(mesh, pair)))
     return np.asarray((whole > 0.0) & (uneven <= _UNEVEN * whole))[patch]
 
@@ -200,15 +193,14 @@ def _may_be_edges(mesh: Mesh, pair: Ints, fold: Floats) -> Bools:
     """Return which smooth folds (e,) may be edges: those of patches that fold strongly or whose facets are uneven, in
     the mean over the patch weighted by fold times length, and those of patches that are too small to tell: of few
     folds, or, where they are doubly curved, with few vertices that smooth folds surround."""
-    one, span = pair[:, 0], _spans(mesh, pair)
-    weight = fold * np.linalg.norm(span, axis=1)
+    one, weight = pair[:, 0], fold * edge_lengths(mesh.vertices, mesh.faces, pair)
     of_facet = components(pair // 3, len(mesh.faces))
     patch, crease = of_facet[one // 3], crease_angle(mesh.crease_deg or 0.0)
 
     def mean(x: Floats) -> Floats:
         return np.asarray(np.bincount(patch, weight * x) / np.maximum(np.bincount(patch, weight), 1e-300))
 
-    one_way = _one_way(mesh, pair, span, fold, of_facet)[: patch.max() + 1]
+    one_way = _one_way(mesh, pair, fold, of_facet)[: patch.max() + 1]
     wide = crease * np.where(one_way, _STRIPS, _WIDE)
     uncertain = (mean(_uneven(mesh, pair)) > _UNEVEN) | (mean(fold) > wide) | (np.bincount(patch, fold > 0.0) < _FEW)
     uncertain |= ~one_way & (_within(mesh, pair, fold, of_facet)[: patch.max() + 1] < _FEW)
@@ -218,7 +210,7 @@ def _may_be_edges(mesh: Mesh, pair: Ints, fold: Floats) -> Bools:
 def _within(mesh: Mesh, pair: Ints, fold: Floats, patch: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return how many vertices of each patch lie within it, where it is doubly curved: smooth folds lie between all
     facets about them, three of them bent at least. Args: as for `_one_way`."""
-    point = point_numbers(mesh.corners.reshape(-1, 3))
+    point = point_numbers(mesh.vertices)[mesh.faces].ravel()
     one = pair[:, 0]
     ends = np.concatenate([point[one], point[np.where(one % 3 == 2, one - 2, one + 1)]])
     n = int(point.max()) + 1
@@ -230,33 +222,12 @@ def _within(mesh: Mesh, pair: Ints, fold: Floats, patch: NDArray[np.int64]) -> N
     return np.bincount(of_point[surrounded], minlength=int(patch.max()) + 1)
 
 
-def _one_way(mesh: Mesh, pair: Ints, span: Floats, fold: Floats, patch: NDArray[np.int64]) -> Bools:
-    """Return which patches are singly curved, given the vectors span (e, 3) [m] along edges, their folds (e,) [rad] and
-    the patch (f,) of each facet.
-
-    A facet bends across each of its edges by the fold times the edge's length; on a singly curved patch the tensor of
-    that has one nonzero eigenvalue. Source: Cohen-Steiner, Morvan, Restricted Delaunay triangulations and normal cycle,
-    Proc. SCG 2003.
-    """
-    length = np.linalg.norm(span, axis=1)
-    along = span / np.maximum(length, 1e-300)[:, None]
-    weight, facet, across, v = fold * length, pair.T.ravel() // 3, [], mesh.corners
-    for half in pair.T:
-        corners = v[half // 3]
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        across.append(np.cross(along, normal / np.linalg.norm(normal, axis=1, keepdims=True)))
-    tensor = np.zeros((len(mesh.faces), 3, 3))
-    for i, j in np.argwhere(np.tri(3)):
-        # Of a symmetric matrix the lower half is read.
-        tensor[:, i, j] = np.bincount(
-            facet, np.concatenate([weight * x[:, i] * x[:, j] for x in across]), len(mesh.faces)
-        )
-    bends = np.linalg.eigvalsh(tensor)
-    most, least = (np.bincount(patch, bends[:, i]) for i in (2, 1))
+def _one_way(mesh: Mesh, pair: Ints, fold: Floats, patch: NDArray[np.int64]) -> Bools:
+    """Return which patches are singly curved, given the folds (e,) [rad] of edges and the patch (f,) of each facet."""
+    most, least = (np.bincount(patch, x) for x in bends(*_facets(mesh), pair, fold))
     return np.asarray(least < _ONE_WAY * most)
 
 
-def _spans(mesh: Mesh, pair: Ints) -> Floats:
-    """Return the vectors (e, 3) [m] along edges."""
-    v, corner, one = mesh.vertices, mesh.faces.ravel(), pair[:, 0]
-    return np.asarray(v[corner[np.where(one % 3 == 2, one - 2, one + 1)]] - v[corner[one]])
+def _facets(mesh: Mesh) -> tuple[Floats, Ints, Floats]:
+    """Return vertices, faces and their unit normals (f, 3)."""
+    return mesh.vertices, mesh.faces, planes_of(mesh.corners)[0]

@@ -146,7 +146,8 @@ class Mesh:
     @property
     def areas(self) -> Floats:
         """Areas (f,) [m2] of the faces."""
-        return 0.5 * np.linalg.norm(_cross(self.vertices, self.faces), axis=1)
+        areas: Floats = planes_of(self.corners)[1]
+        return areas
 
     def volume(self) -> float:
         """Return the signed volume [m3] enclosed; meaningful where watertight."""
@@ -228,10 +229,6 @@ def smooth_normals(vertices: Floats, faces: Ints, crease_deg: float = CREASE_DEG
     a, b, ea, eb, opposed = _edge_pairs(faces)
     pair = np.stack([3 * a + ea, 3 * b + eb], axis=1)[opposed]
     return smoothed(vertices, faces, pair[folds(vertices, faces, pair) < crease_angle(crease_deg)])
-
-
-def _cross(v: Floats, f: Ints) -> Floats:
-    return np.cross(v[f[:, 1]] - v[f[:, 0]], v[f[:, 2]] - v[f[:, 0]])
 
 
 def _edge_pairs(f: Ints) -> tuple[Ints, Ints, Ints, Ints, NDArray[np.bool_]]:
