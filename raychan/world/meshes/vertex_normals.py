@@ -69,7 +69,9 @@ def smoothed(vertices: Floats, faces: Ints, pair: Ints, power: float = NEAR) -> 
     near = _neighbours(group.reshape(n, 3), count)
     first, beside, limits = total.copy(), (near.indptr, near.indices), (_LEAST_PIVOT, _FITTED, _ENOUGH)
     parallel_for(len(shared), lambda r: corrected(place, first, shared[r], beside, float(power), limits, total))
-    return np.asarray(np.where(lost[group][:, None], np.repeat(own, 3, axis=0), total[group]).reshape(n, 3, 3))
+    out, flat = total[group], np.flatnonzero(lost[group])
+    out[flat] = own[flat // 3]
+    return np.asarray(out.reshape(n, 3, 3))
 
 
 def components(links: Ints, n: int) -> NDArray[np.int64]:
