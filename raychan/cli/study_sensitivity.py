@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from raychan.cli import show
-from raychan.cli.options import Changes, MaxBounces, SceneFile, Seed, Tolerance, directory
+from raychan.cli.options import Changes, MaxBounces, SceneFile, Seed, Tolerance, directory, within
+from raychan.world import limits
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -18,15 +19,35 @@ if TYPE_CHECKING:
     from raychan.study.sensitivity import Sensitivity
 
 
+Draws = Annotated[
+    int,
+    typer.Option(
+        help="How often the bodies are displaced; each is a run.", metavar="N", callback=within(limits.DRAWS, True)
+    ),
+]
+TurnDeg = Annotated[
+    float,
+    typer.Option(
+        help="Standard deviation of the turn about each axis, degrees.",
+        metavar="DEG",
+        callback=within(limits.TURN_DEG),
+    ),
+]
+ShiftMm = Annotated[
+    float,
+    typer.Option(
+        help="Standard deviation of the shift along each axis, millimetres.",
+        metavar="MM",
+        callback=within(limits.SHIFT_MM),
+    ),
+]
+
+
 def sensitivity(
     scene: SceneFile,
-    draws: Annotated[int, typer.Option(help="How often the bodies are displaced; each is a run.", metavar="N")] = 20,
-    turn_deg: Annotated[
-        float, typer.Option(help="Standard deviation of the turn about each axis, degrees.", metavar="DEG")
-    ] = 0.05,
-    shift_mm: Annotated[
-        float, typer.Option(help="Standard deviation of the shift along each axis, millimetres.", metavar="MM")
-    ] = 1.0,
+    draws: Draws = 20,
+    turn_deg: TurnDeg = 0.05,
+    shift_mm: ShiftMm = 1.0,
     each: Annotated[
         bool, typer.Option("--each", help="Also move one body at a time: which body moves which level.")
     ] = False,

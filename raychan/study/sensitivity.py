@@ -24,15 +24,12 @@ from raychan.run.simulate import simulate
 from raychan.study.detection_tracks import NOISE, Track, follow
 from raychan.world.displaced import Displacement, displaced, movable
 from raychan.world.errors import SceneError
-from raychan.world.limits import Limit
+from raychan.world.limits import DRAWS, SHIFT_MM, TURN_DEG
 from raychan.world.scene import Scene
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 
-DRAWS = Limit(2, 10_000, "", "each is a run of its own")
-TURN_DEG = Limit(0.0, 45.0, "deg", "a tolerance, not another pose")
-SHIFT_MM = Limit(0.0, 1e4, "mm", "a tolerance, not another place")
 
 SPECKLE, ERROR, STEADY, INTERMITTENT = "speckle", "error", "steady", "intermittent"
 VERDICTS = {

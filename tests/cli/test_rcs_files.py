@@ -18,3 +18,8 @@ def test_a_figure_that_cannot_be_written_leaves_the_table(tmp_path, capsys):
     png.rmdir()
     assert invoke(["rcs", "--shape", "plate", "--out", str(out), "--plot", str(png)]) == 2
     assert "RCS dBsm" in capsys.readouterr().out and not png.exists()
+
+
+def test_a_ball_too_large_for_its_sag_is_named_by_its_own_radius(capsys):
+    assert invoke(["rcs", "--shape", "sphere", "radius=300"]) == 2
+    assert "an arc of radius 300 m" in capsys.readouterr().err

@@ -45,9 +45,9 @@ def test_the_command_writes_tables_and_a_figure_and_tells_speckle_from_error(fil
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--draws", "1"], "draws = 1: must lie between 2 and"),
-        (["--turn-deg", "-1"], "turn_deg = -1.0: must lie between 0 and 45 deg"),
-        (["--shift-mm", "nan"], "shift_mm = nan: must lie between 0"),
+        (["--draws", "1"], "'--draws': 1: must lie between 2 and"),
+        (["--turn-deg", "-1"], "'--turn-deg': -1.0: must lie between 0 and 45 deg"),
+        (["--shift-mm", "nan"], "'--shift-mm': nan: must lie between 0"),
         (["--turn-deg", "0", "--shift-mm", "0"], "nothing would move"),
         (["--set", "bodies.sing.yaw_deg=3"], "did you mean 'sign'"),
         (["--set", "bodies.sign.role=mirror"], "no body can be displaced"),

@@ -237,3 +237,16 @@ def test_diffraction_to_a_receiver_elsewhere_is_refused_before_anything_is_trace
 def test_what_is_given_in_python_is_told_with_what_is_allowed(make, said):
     with pytest.raises(SceneError, match=said):
         make()
+
+
+def test_a_key_given_twice_is_named_with_its_line():
+    with pytest.raises(SceneError, match=r"not valid TOML: .frequency_ghz. is given twice") as said:
+        Scene.from_text("[radar]\nfrequency_ghz = 77\nfrequency_ghz = 78\n")
+    assert "Cannot" not in str(said.value)
+
+
+def test_a_file_in_another_encoding_is_told_by_its_byte_and_line(tmp_path):
+    file = tmp_path / "latin.toml"
+    file.write_bytes('[radar]\nname = "Stra\xdfe"\n'.encode("latin-1"))
+    with pytest.raises(SceneError, match=r"latin.toml:2: not valid TOML: byte 0xdf is no text in UTF-8"):
+        Scene.load(file)

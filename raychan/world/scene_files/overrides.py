@@ -30,6 +30,9 @@ def refuse_mesh(file: Path) -> None:
 
 def no_toml(reason: object, file: Any, line: int = 0) -> SceneError:
     """Return the error for a file that is no TOML; another ending than .toml may be that of a mesh that is not read."""
+    if isinstance(reason, UnicodeDecodeError):
+        line = reason.object[: reason.start].count(b"\n") + 1
+        reason = f"byte 0x{reason.object[reason.start]:02x} is no text in UTF-8"
     if file is None or Path(file).suffix.lower() in ("", ".toml"):
         return SceneError(f"not valid TOML: {reason}", file=file, line=line, allowed="a text in TOML 1.0")
     allowed = f"a scene file (.toml), in which a body may name a mesh; meshes are {', '.join(SUFFIXES)}"
@@ -47,11 +50,17 @@ def parsed(text: str, file: Any = None) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as e:
         found = re.search(r"line (\d+)", str(e))
         line = int(found[1]) if found else len(text.splitlines())
-        raise no_toml(e, file, line) from None
+        raise no_toml(_twice(text, line) if "Cannot overwrite" in str(e) else e, file, line) from None
     except ValueError as e:  # a number of too many digits, a date that is none
         raise no_toml(e, file) from None
     except RecursionError:
         raise SceneError("tables or lists nested too deep", file=file, allowed="a few levels") from None
+
+
+def _twice(text: str, line: int) -> str:
+    """Return the words for a key that stands in a line of a text and before it."""
+    key = text.splitlines()[line - 1].partition("=")[0].strip()
+    return f"'{key}' is given twice, or is a value and a table"
 
 
 def listed(changes: Any) -> list[str]:

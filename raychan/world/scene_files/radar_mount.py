@@ -146,7 +146,9 @@ def antenna_table(given: str | AntennaTable, folder: Path, key: str, file: Any =
             else "a table, or a TOML file by its path from the scene file"
         )
         raise SceneError(f"no antenna file {path}", file=file, key=key, value=given, allowed=allowed) from None
-    except (OSError, UnicodeDecodeError) as e:
+    except UnicodeDecodeError as e:
+        raise overrides.no_toml(e, path) from None
+    except OSError as e:
         reason = getattr(e, "strerror", None) or e
         raise SceneError(f"{path} cannot be read ({reason})", file=file, key=key, value=given) from None
     return checked(AntennaTable, overrides.parsed(text, path), path), path

@@ -26,6 +26,7 @@ def revolve(profile: Curve, sag: float = SAG, start: float = 0.0, stop: float = 
 def ellipsoid(semi: tuple[float, float, float], sag: float = SAG) -> Piece:
     """Return an ellipsoid of semi-axes (3,) [m] about the origin."""
     largest = max(semi)
+    steps(largest, 2.0 * np.pi, min(sag, 0.05 * largest))  # where these are too many, it names the radius given
     profile = arcs([(1.0, np.pi / 2.0)] * 2, -np.pi / 2.0, min(sag / largest, 0.05))
     profile.points[:] += [0.0, -1.0]
     profile.points[[0, -1], 0] = 0.0
