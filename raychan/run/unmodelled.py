@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.diffuse import mean_sigma0
-from raychan.channel.mesh_error import CUBIC
 from raychan.parallel import parallel_map
 from raychan.radar.radar import Radar
 from raychan.records import Facets, Paths, Points
@@ -81,6 +80,7 @@ def ledger(
 
 # Sectors [rad] and rings of rough ground: finer against 36,000 rays at most, about 0.1 s (not measured by a command).
 _SECTOR, _RINGS = np.radians(5.0), 500
+_CUBIC = 0.01  # rad (rms) that facets lie off a smoother surface: from there on it is told
 _NEAR = 80.0  # m: the strongest range cell of rough ground lies nearer, by 1 / r^3 (not measured)
 _FOLDED = 2.0  # unambiguous ranges: what is farther adds at most an eighth, by 1 / r^3
 _NAMES = (
@@ -259,10 +259,10 @@ def _tessellation(
     other = f"facets of {coarse} lie {off:.2g} rad (rms) off a smoother surface of the same corners and normals"
     name, phase, changed = strongest_bend(paths, geometry, estimated, radar, settings)
     if name:
-        more = f"; {other}, not estimated" if off > CUBIC else ""
+        more = f"; {other}, not estimated" if off > _CUBIC else ""
         how = f"facets of {name} are taken as smooth: {phase:.2g} rad (rms) from flat ones, of its strongest cell{more}"
         return Entry(float(db(changed / weakest)), "estimate", how)
-    if off > CUBIC:
+    if off > _CUBIC:
         return Entry(UNKNOWN, "none", f"{other}: what a finer mesh would change is not estimated")
     return Entry(
         NOTHING, "exact", "no echo comes from smoothed facets" if estimated else "no body has estimated normals"
