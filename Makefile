@@ -11,8 +11,8 @@ BIN := $(VENV)/bin
 # is compiled in a seventh less time, and runs these as fast.
 BOUNDS := $(addprefix tests/,em house/test_bounds.py compile/test_code_cache.py processing/test_range_doppler.py processing/test_fold_kernels.py \
 	processing/test_climb_kernels.py processing/test_rival_sets.py processing/test_near_field.py signal/test_arrays.py signal/test_drifting_sources.py signal/test_fronts.py signal/test_nufft.py \
-	world/test_shapes.py world/test_ray_caster.py world/test_contractions.py run/test_provenance.py run/test_preview_bounds.py channel/test_corner_places.py channel/test_filon.py \
-	channel/test_layers_over_a_footprint.py channel/test_fields_over_a_footprint.py tracing/test_landing_on_curves.py \
+	world/test_shapes.py world/test_ray_caster.py world/test_contractions.py world/test_vertex_normals.py run/test_provenance.py run/test_preview_bounds.py channel/test_corner_places.py channel/test_filon.py \
+	channel/test_layers_over_a_footprint.py channel/test_fields_over_a_footprint.py tracing/test_landing_on_curves.py tracing/test_contradicted_edges.py \
 	run/test_narrow_beams.py tracing/test_ways.py \
 	$(addprefix tracing/test_,edge_diffraction.py image_paths.py occluders.py subdivide.py visibility.py))
 # Tests of the kernels that are cheap enough as plain Python; marked `compiled`: what is not, each with its reason.

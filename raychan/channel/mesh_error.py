@@ -26,9 +26,11 @@ Rows = NDArray[np.signedinteger]
 _FITS = 2.0  # of the change by the alternative fit of normals: both fits share part of their error
 _FACETS = 0.005  # of the value: error of quadratic patches although their normals are right
 _HALVED = 4.0 / 3.0  # of the change by halving the facets: the limit of a series that converges with second order
-CUBIC = 0.001
+_CUBIC = 0.001
 """rad of phase: cubic edges that deviate less from the quadratic ones are not computed. Of 60 wavy sheets 57 lie within
 what is stated so, 49 with 0.01, off by up to 2.0 and 7.8 times that (`python tests/run/test_wavy_sheets.py 2 60`)."""
+_CUBIC_FITTED = 0.01  # rad: the same where another fit of normals tells of the surface, too; below it what a coarse
+# launch leaves of double bounces counts for more (a saddle at 10 GHz: 0.02 dB off, 0.69 stated with 0.001)
 _EDGES_DB = 1.2  # of the change in dB by taking the uncertain folds as edges
 _PARTLY = 0.5  # of the field's change: only some of the uncertain folds may be edges
 # Of x^(4/3) exp(-_DECAY x^(1/3) arc) / k: upper bound of the creeping wave of a sphere of k a = x along an arc [rad].
@@ -95,20 +97,22 @@ def mesh_error(geometry: Geometry, found: Alternatives, wavenumber: float) -> Me
     for normals in (found.creased, found.rounded):
         if normals is not None:
             certain &= (normals == facets.normals).all(axis=(1, 2))
+    least = _CUBIC if fitted is None else _CUBIC_FITTED
     # Facets that were merged lie as near to the mesh's surface as was asked for, whatever a cubic one does.
-    sure = _halved(geometry, certain if found.checked is None else certain & ~found.checked, wavenumber)
+    sure = _halved(geometry, certain if found.checked is None else certain & ~found.checked, wavenumber, least)
     # Uncertain facets that are no regular tessellation have no smooth surface to come nearer to.
     rest = geometry.curved & ~certain & (False if found.regular is None else found.regular)
-    unsure = _halved(geometry, rest, wavenumber) if sure is None and rest.any() else None
-    finer = None if rounded is None else _halved(rounded, rounded.curved, wavenumber)
+    unsure = _halved(geometry, rest, wavenumber, least) if sure is None and rest.any() else None
+    finer = None if rounded is None else _halved(rounded, rounded.curved, wavenumber, least)
     return MeshError(fitted, creased, rounded, sure, unsure, finer)
 
 
-def _halved(geometry: Geometry, rows: Bools, wavenumber: float) -> Geometry | None:
-    """Return a surface with all facets halved; None where that changes nothing on those of `rows` (f,)."""
+def _halved(geometry: Geometry, rows: Bools, wavenumber: float, least: float) -> Geometry | None:
+    """Return a surface with all facets halved; None where that changes phases on those of `rows` (f,) by less than the
+    least [rad]."""
     facets = geometry.facets
     off = cubic_off(facets.vertices[rows], facets.normals[rows], geometry.edge_curvature[rows])
-    if 2.0 * wavenumber * off.max(initial=0.0) < CUBIC:
+    if 2.0 * wavenumber * off.max(initial=0.0) < least:
         return None
     v, n = halved(facets.vertices, facets.normals)
     every = np.tile(np.arange(len(facets.vertices)), 4)

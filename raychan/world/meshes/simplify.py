@@ -19,6 +19,7 @@ from raychan.geometry.contractions import contract
 from raychan.geometry.flips import flip_edges
 from raychan.geometry.half_edges import Net, by_first_use, followed, leaving, lock, pair_up
 from raychan.parallel import parallel_for
+from raychan.world.meshes.convexity import convex
 from raychan.world.meshes.mesh import Mesh
 from raychan.world.meshes.surface_check import Check
 
@@ -75,8 +76,8 @@ def simplify(
     Args: fixed (f,) facets that stay as they are; sag_alone [m] in place of the limits' if the mesh is convex, above 0.
     """
     whole, height = _net(mesh, fixed)
-    convex = _convex(mesh, height)
-    sag = sag_alone if sag_alone > 0.0 and convex else limits.sag
+    alone = _convex(mesh, height)
+    sag = sag_alone if sag_alone > 0.0 and alone else limits.sag
     for few in (_FEW, 1):
         rounds = _Rounds(whole, limits._replace(sag=sag), few)
         rounds.contract()
@@ -98,7 +99,7 @@ def simplify(
         part_materials=mesh.part_materials,
     )
     # What is convex stays so, although facets may meet in grooves of micrometres.
-    coarse.__dict__["topology"] = replace(coarse.topology, convex=convex)
+    coarse.__dict__["topology"] = replace(coarse.topology, convex=alone)
     merged = (corner != 3 * rounds.facet[:, None] + np.arange(3)).any(axis=1)
     return Simplified(coarse, corner, merged, rounds.deviation, sag), rounds.home
 
@@ -106,8 +107,8 @@ def simplify(
 def _convex(mesh: Mesh, height: float) -> bool:
     """Return whether a mesh is closed, of one piece and convex, as in `mesh_topology`, given by how far facets rise
     over their neighbours' planes [m]: of k such pieces the vertices less half the facets are 2 k (Euler)."""
-    size = float(np.linalg.norm(np.ptp(mesh.bounds, axis=0)))
-    return height < 1e-9 * (1.0 + size) and 2 * len(mesh.vertices) - len(mesh.faces) == 4
+    closed = 2 * len(mesh.vertices) - len(mesh.faces) == 4
+    return closed and convex(height, mesh.bounds, lambda: (mesh.vertices, mesh.faces))
 
 
 def _net(mesh: Mesh, fixed: Bools) -> tuple[Net, float]:

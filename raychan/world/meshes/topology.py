@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.geometry.triangles import edge_folds, planes_of
+from raychan.world.meshes.convexity import convex
 from raychan.world.meshes.pieces import edges, pieces
 
 Floats = NDArray[np.float64]
@@ -103,8 +104,8 @@ def mesh_topology(
     border = _unpaired(pair[flat], n)
     outer = np.flatnonzero(_unpaired(pair[flat | soft], n))
     outer = outer[np.argsort(plane[outer // 3], kind="stable")]
-    size = float(np.linalg.norm(np.ptp(v, axis=(0, 1))))
     whole = not len(rim) and int(_components(pair, n).max()) == 0
+    bounds = np.array([v.min(axis=(0, 1)), v.max(axis=(0, 1))])
     along = _along_curve(v.mean(axis=1))
     if body is not None:
         along = along[np.argsort(body[along], kind="stable")]
@@ -118,10 +119,16 @@ def mesh_topology(
         turn=turn,
         outer=outer.astype(np.int32),
         border=border,
-        convex=bool(whole and (height < 1e-9 * (1.0 + size)).all()),
+        convex=whole and convex(float(height.max()), bounds, lambda: _points(vertex, v)),
         order=along,
         first=_starts(None if body is None else body[along], n),
     )
+
+
+def _points(vertex: NDArray[np.int64], v: Floats) -> tuple[Floats, NDArray[np.int64]]:
+    """Return the points (k, 3) [m] of facets by the numbers of their corners v (n, 3, 3), and those numbers from 0."""
+    _, first, number = np.unique(vertex.ravel(), return_index=True, return_inverse=True)
+    return v.reshape(-1, 3)[first], number.reshape(-1, 3)
 
 
 def _starts(body: NDArray[np.signedinteger[Any]] | None, n: int) -> NDArray[np.int64]:
