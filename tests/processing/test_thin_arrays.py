@@ -126,7 +126,7 @@ def test_a_slanted_line_measures_one_angle_at_full_gain(roll, method):
     assert found.snr[0] == pytest.approx(SNR_DB, abs=0.5)
 
 
-@pytest.mark.parametrize("extent", [1e-9, 1e-5, 1e-4, 5e-4])
+@pytest.mark.parametrize("extent", [1e-9, 1e-4, 5e-4])
 @pytest.mark.parametrize("axes", [[1], [1, 2]])
 def test_what_a_line_ahead_cannot_tell_is_ambiguous(axes, extent):
     elements = LINE[:, [1, 0, 2]].copy()
