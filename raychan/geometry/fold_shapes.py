@@ -38,7 +38,8 @@ def outward(v, faces, normal, pair):  # type: ignore[no-untyped-def]
 @njit(cache=True, nogil=True, error_model="numpy")
 def bends(v, faces, normal, pair, fold):  # type: ignore[no-untyped-def]
     """Return by how much (m,) [m rad] each facet bends most over its edges, and across that: the eigenvalues of the sum
-    of fold times length over its edges, as tensors across these. Args: as for `outward`; fold (e,) [rad].
+    of fold times length over its edges, as tensors across these; on a singly curved surface the second is zero. Args:
+    as for `outward`; fold (e,) [rad].
 
     Source: Cohen-Steiner, Morvan, Restricted Delaunay triangulations and normal cycle, Proc. SCG 2003.
     """
