@@ -11,6 +11,7 @@ import contextlib
 import gc
 import hashlib
 import operator
+import zlib
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -39,8 +40,7 @@ class Kernel(CPUDispatcher):  # type: ignore[no-any-unimported]
     """A compiled function. Called from Python, it takes read-only arrays as writable ones: numba would compile it once
     more for every mixture of both.
 
-    With bounds checked (NUMBA_BOUNDSCHECK=1) read-only arrays stay so, and a kernel that writes to one does not
-    compile.
+    With bounds checked (NUMBA_BOUNDSCHECK=1) a call that changes a read-only array raises ValueError.
     """
 
     kept: CodeCache
@@ -48,10 +48,8 @@ class Kernel(CPUDispatcher):  # type: ignore[no-any-unimported]
     served: set[tuple[int, ...]]  # codes of the types of read-only arguments that code for writable ones serves
 
     def _compile_for_args(self, *args: Any, **named: Any) -> Any:
-        """Return the code for arguments of types that no call had before; unless bounds are checked, it may write to
-        all arrays. Later calls of such types go straight to it."""
-        if _CHECKED:
-            return super()._compile_for_args(*args, **named)
+        """Return the code for arguments of types that no call had before; it may write to all arrays. Later calls of
+        such types go straight to it."""
         code = super()._compile_for_args(*map(_open, args), **named)
         given, opened = (tuple(self._code_of(x) for x in xs) for xs in (args, map(_open, args)))
         with global_compiler_lock:
@@ -112,6 +110,27 @@ class Kernel(CPUDispatcher):  # type: ignore[no-any-unimported]
             self.overloads[tuple(compiled.signature.args)] = compiled
 
 
+class CheckedKernel(Kernel):
+    """A kernel that tells, after each call from Python, whether a read-only array is what it was."""
+
+    def __call__(self, *args: Any, **named: Any) -> Any:
+        """Return what the kernel does. Raises: ValueError if it changes a read-only array."""
+        held = [(x, zlib.crc32(x.tobytes())) for x in _read_only((*args, *named.values()))]
+        found = super().__call__(*args, **named)
+        if any(zlib.crc32(x.tobytes()) != was for x, was in held):
+            raise ValueError(f"{self.py_func.__qualname__} writes to a read-only array")
+        return found
+
+
+def _read_only(values: tuple[Any, ...]) -> Iterator[np.ndarray[Any, Any]]:
+    """Yield the arrays that are read-only, of values alone or in tuples."""
+    for value in values:
+        if isinstance(value, tuple):
+            yield from _read_only(value)
+        elif type(value) is np.ndarray and not value.flags.writeable:
+            yield value
+
+
 def _held(kind: Any) -> bool:
     """Tell whether a type is an array, or a tuple that holds one."""
     return isinstance(kind, types.Array) or any(map(_held, getattr(kind, "types", ())))
@@ -163,7 +182,7 @@ def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
                 unkept.append(str(reason))
                 made.stamp = hashlib.sha256(_within_reach(function, function.__code__.co_filename)).digest()
                 return made
-            made.__class__ = Kernel
+            made.__class__ = CheckedKernel if _CHECKED else Kernel
             made._cache = made.kept = cache
             made.served = set()
             made.stamp = made.kept.stamped(hashlib.sha256(_within_reach(function, made.kept.source)).digest())

@@ -73,6 +73,18 @@ def _power(snapshots, basis, beams, u, w, wave):  # type: ignore[no-untyped-def]
     return _seen(snapshots, wave) / alone if alone > ALONE * len(wave) else 0.0
 
 
+@njit(cache=True, nogil=True, error_model="numpy")
+def gains_beside(gains, at, rests, bases, beams):  # type: ignore[no-untyped-def]
+    """Write the power (b, s) that waves from cosines at (b, 2) explain beside each of sets of others, of which
+    orthonormal rows bases (s, k, a) are and which leave snapshots rests (s, n, a). Args: beams as `Beams`."""
+    wave = np.empty(beams.parts.shape[1], np.complex128)
+    for b in range(len(at)):
+        _point(wave, beams, at[b, 0], at[b, 1])
+        for s in range(len(rests)):
+            alone = len(wave) - _seen(bases[s], wave)
+            gains[b, s] = _seen(rests[s], wave) / alone if alone > ALONE * len(wave) else 0.0
+
+
 @njit(cache=True, nogil=True)
 def _moved(u, w, axis, steps, beams):  # type: ignore[no-untyped-def]
     """Return cosines u and w moved along an axis by so many of its first steps, of a deep array as Aperture.moved

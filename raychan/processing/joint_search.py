@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.processing.climb_kernels import ALONE, refine_sets, snapshots_for
-from raychan.processing.spectra import PER_BEAM, Beside, beams_of, between, peaks, squared
+from raychan.processing.climb_kernels import refine_sets, snapshots_for
+from raychan.processing.spectra import BEAMS_PER_BEAM, Beside, beams_of, between, explained_beside, peaks, squared
 from raychan.radar.aperture import Aperture
 
 Floats = NDArray[np.float64]
@@ -29,9 +29,11 @@ _SETS, _UNFINISHED = 32, 256
 _MANY, _FIRST = 128, 256
 """Sets refined, and first beams tried, of few elements to an echo. Of 60 pairs of 36 dB on 6 places in a plane 11 are
 wrong with 32 and 52, 10 with 128 and 52, 2 with 32 and 256; of 40 threes on 8 places 14 with 32 and 256, 9 with 128."""
+_PER_BEAM = BEAMS_PER_BEAM
+"""Of 712 pairs, threes and fours of 33 dB before 6 to 22 places 38 are wrong with 8 to a beam width, 28 with 4."""
 _PAIRS = 1 << 18  # of beams tried: all of a line of 30 wavelengths, else those of the strongest beams (not measured)
 _SAME = 0.5  # beam widths: sets whose waves are all nearer are one (not measured)
-_BATCH = 1 << 21  # beams times sets times waves at once, 32 MB
+_BATCH = 1 << 22  # beams times sets at once, 32 MB
 _ROUNDS = 20  # of refining a set by turns (not measured)
 _STILL = 1e-5  # beam widths: a wave that moves less has arrived
 _KEPT = 4  # searches kept: a cell's, of one wave more, and of the same again where they are judged (not measured)
@@ -84,35 +86,40 @@ def _beside(data: Complexes, aperture: Aperture, others: Floats) -> Beside:
 
 def _on_grid(data: Complexes, aperture: Aperture, count: int) -> Floats:
     """Return sets of beams (s, count, 2) on a grid that explain most of snapshots (n, a)."""
-    beams = aperture.spread(PER_BEAM) if aperture.deep else aperture.grid(PER_BEAM).points
-    slack = 2.0 * between(aperture, PER_BEAM) * float(squared(data).sum())
-    steering = aperture.steering(beams)
-    seen = steering.conj() @ data.T
-    values = squared(seen).sum(axis=1) / steering.shape[1]
-    refined, first = (_MANY, _FIRST) if steering.shape[1] <= FEW * count else (_SETS, _SETS)
+    beams = aperture.spread(_PER_BEAM) if aperture.deep else aperture.grid(_PER_BEAM).points
+    size = len(aperture.elements)
+    slack = 2.0 * between(aperture, _PER_BEAM) * float(squared(data).sum())
+    values = explained_beside(data[None], np.zeros((1, 0, size), complex), aperture, beams)[:, 0]
+    refined, first = (_MANY, _FIRST) if size <= FEW * count else (_SETS, _SETS)
     rows = np.argsort(-values, kind="stable")[: max(first, _PAIRS // len(beams))]
     sets, values = beams[rows, None], values[rows]
     for held in range(1, count):
         last = held + 1 == count
         kept = refined if last else _UNFINISHED
-        bases = [_basis(aperture.steering(at)) for at in sets]
-        more = values[:, None] + _gains(data, steering, seen, np.array(bases))
-        sets, values = _longer(aperture, beams, sets, more, kept, slack if last else np.inf)
+        some, more = _with_each(data, aperture, beams, sets, values, slack if last else np.inf)
+        sets, values = _longer(aperture, some, sets, more, kept, slack if last else np.inf)
     return sets
 
 
-def _gains(data: Complexes, steering: Complexes, seen: Complexes, bases: Complexes) -> Floats:
-    """Return what beams (b, a), which see (b, n) of snapshots (n, a), explain beside each of bases (s, k, a)."""
-    sets, count, size = bases.shape
-    gains, batch = np.empty((sets, len(steering))), max(1, _BATCH // (sets * count))
-    for some in (slice(i, i + batch) for i in range(0, len(steering), batch)):
-        shared = (steering[some].conj() @ bases.reshape(-1, size).T).reshape(-1, sets, count)
-        alone = size - squared(shared).sum(axis=2)
-        power = np.zeros(alone.shape)
-        for snapshot, wave in zip(data, seen[some].T, strict=True):
-            power += squared(wave[:, None] - (shared * (bases.conj() @ snapshot)).sum(axis=2))
-        gains[:, some] = np.where(alone > ALONE * size, power / np.maximum(alone, ALONE), 0.0).T
-    return gains
+def _with_each(
+    data: Complexes, aperture: Aperture, beams: Floats, sets: Floats, values: Floats, slack: float
+) -> tuple[Floats, Floats]:
+    """Return those (b, 2) of beams that may add most to sets (s, k, 2) of values (s,), and what sets explain of
+    snapshots (n, a) with each of them (s, b): all within `slack` of the most, as far as memory allows."""
+    bases = np.array([_basis(aperture.steering(at)) for at in sets])
+    rests = data - (data @ bases.conj().transpose(0, 2, 1)) @ bases
+    found, gained, tops = np.zeros((0, 2)), np.zeros((0, len(sets))), np.zeros(0)
+    batch = max(1, _BATCH // len(sets))
+    for some in (beams[i : i + batch] for i in range(0, len(beams), batch)):
+        more = values + explained_beside(rests, bases, aperture, some)
+        found, gained, tops = (np.concatenate(x) for x in ((found, some), (gained, more), (tops, more.max(axis=1))))
+        if len(found) > batch:
+            near = tops > tops.max() - slack
+            found, gained, tops = found[near], gained[near], tops[near]
+            if len(found) > batch:
+                most = np.sort(np.argsort(-tops, kind="stable")[:batch])
+                found, gained, tops = found[most], gained[most], tops[most]
+    return found, np.ascontiguousarray(gained.T)
 
 
 def _longer(
@@ -146,7 +153,7 @@ def _refine(data: Complexes, aperture: Aperture, sets: Floats) -> Floats:
     """Move the waves of sets (s, k, 2) by turns to where they explain most of snapshots (n, a); return what sets leave
     (s,)."""
     width = np.where(np.isfinite(aperture.beamwidth), aperture.beamwidth, 1.0)
-    left, beams = np.empty(len(sets)), beams_of(aperture, aperture.grid(PER_BEAM))
+    left, beams = np.empty(len(sets)), beams_of(aperture, aperture.grid(_PER_BEAM))
     refine_sets(sets, left, snapshots_for(data), beams, _ROUNDS, _STILL * width)
     return left
 

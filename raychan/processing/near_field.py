@@ -17,7 +17,7 @@ from raychan.radar.aperture import Aperture
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complexfloating[Any, Any]]
 
-_SHARED = ("scans", "places", "index", "pitch", "period", "beamwidth", "depth", "deep", "table")
+_SHARED = ("scans", "places", "index", "pitch", "period", "beamwidth", "depth", "deep", "table", "spreads")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -45,15 +45,24 @@ class Scan:
         """Return how directions in a cell at a distance [m] are sought: in the near field as of spherical waves from
         there, as of mirrors from twice as far, from where the cell's range is folded from, and last as of plane waves.
         Args: noise, share of the cell's power below which an echo is none: what curvature leaves far below it tells
-        nothing."""
-        if not self.parts or self.method != "bartlett" or distance <= 0.0:
+        nothing.
+
+        Only beams fit spherical waves: nearer than 2 D^2 / wavelength they stand in for other methods."""
+        if not self.parts or distance <= 0.0 or (self.method != "bartlett" and distance >= self._far):
             return [self]
         least = max(_FLOOR, _TELLS * noise)
         if self._curved(distance) <= least:
             return [self]
         own, away, beyond = self.aperture, [x * distance for x in _AWAY], distance + self.beyond
         near = [NearAperture.of(own, self.parts, x) for x in away + [beyond] * bool(self._curved(beyond) > least)]
-        return [replace(self, aperture=x, known=True) for x in [*near, own]]
+        beams = replace(self, method="bartlett", known=True)
+        return [replace(beams, aperture=x) for x in [*near, own]]
+
+    @property
+    def _far(self) -> float:
+        """Where the far field of receivers and transmitters begins, 2 D^2 / wavelength [m]."""
+        spans = (np.ptp(places, axis=0) for places in self.parts)
+        return 2.0 * max(float(x @ x) for x in spans) / self.aperture.wavelength
 
     def _curved(self, distance: Any) -> Any:
         """Return the share of echoes' power (n,), at distances (n,) [m], that is no plane wave as theirs is curved, an

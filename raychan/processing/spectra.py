@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
 
-from raychan.processing.climb_kernels import ALONE, Beams, climb_beams, snapshots_for
+from raychan.parallel import parallel_for
+from raychan.processing.climb_kernels import ALONE, Beams, climb_beams, gains_beside, snapshots_for
 from raychan.processing.covariance import Covariance
 from raychan.processing.near_field import NearAperture
 from raychan.processing.twins import alike, beam, nearest_boresight, neighbours
@@ -46,6 +47,8 @@ _ONE = 0.02  # beam widths: twins, refined each by itself, are nearer (1/128 of 
 _ON = 0.1  # of _ONE: the nearest twins lie on each other (not measured)
 _STARTS = 64  # of climbs for each maximum sought, at most (not measured)
 _BATCH = 1 << 21  # steering values at once, 32 MB
+_KEPT = 1 << 18  # directions of a deep array that are kept from search to search, with those beside each, 23 MB
+_FEWEST = 2000  # beams worth a second thread (not measured)
 _SHRINKS = 7  # steps of the search between grid points, each half as wide: to 1/128 of a step, then by parabola
 _WIDEST = 0.25  # cosine: the longest first step along the ridge of an array that is all but a line (not measured)
 
@@ -128,9 +131,9 @@ def peaks(form: Form, aperture: Aperture, count: int, per_beam: int = PER_BEAM) 
     Args: per_beam, grid points to a beam width."""
     if aperture.deep:
         return _deep_peaks(form, aperture, count, per_beam)
-    grid, batches = aperture.scanned(per_beam)
+    grid = aperture.grid(per_beam)
     values = np.full(grid.visible.shape, -np.inf)
-    values[grid.visible] = np.concatenate([form(steering) for steering in batches])
+    values[grid.visible] = _over(form, aperture, grid, per_beam)
     modes = ["wrap" if wrap else "constant" for wrap in grid.wraps]
     top = (values >= maximum_filter(values, size=3, mode=modes, cval=-np.inf)) & np.isfinite(values)
     m, n = np.nonzero(top)
@@ -140,6 +143,34 @@ def peaks(form: Form, aperture: Aperture, count: int, per_beam: int = PER_BEAM) 
     # Along an oblique ridge points of the grid are greater than their neighbours, and climb to one maximum; so do
     # directions that look alike to a tilted array.
     return found[:count] if aperture.table is not None else _once(nearest_boresight(aperture, found), aperture, count)
+
+
+def _over(form: Form, aperture: Aperture, grid: Grid, per_beam: int) -> Floats:
+    """Return the values (g,) of a form over the points of an aperture's grid, `per_beam` to a beam width."""
+    if (known := aperture.scanned(per_beam)) is not None:
+        return form(known)
+    return _at(form, aperture, grid.points)
+
+
+def _at(form: Form, aperture: Aperture, at: Floats) -> Floats:
+    """Return the values (g,) of a form towards cosines (g, 2)."""
+    if not isinstance(form, Bartlett | Beside):
+        batch = max(1, _BATCH // len(aperture.elements))
+        return np.concatenate([form(aperture.steering(at[i : i + batch])) for i in range(0, len(at), batch)])
+    rows, size = form.snapshots.shape
+    basis = form.basis if isinstance(form, Beside) else np.zeros((0, size), complex)
+    gains = explained_beside(form.snapshots[None], basis[None], aperture, at)[:, 0]
+    return gains if isinstance(form, Beside) else gains / (rows * size)
+
+
+def explained_beside(rests: Complexes, bases: Complexes, aperture: Aperture, at: Floats) -> Floats:
+    """Return the power (g, s) that waves from cosines (g, 2) explain beside sets of others of orthonormal rows bases
+    (s, k, a), which leave snapshots rests (s, n, a)."""
+    out, at = np.empty((len(at), len(rests))), np.ascontiguousarray(at)
+    beams = beams_of(aperture, aperture.grid(PER_BEAM))
+    rests, bases = snapshots_for(rests), snapshots_for(bases)
+    parallel_for(len(at), lambda rows: gains_beside(out[rows], at[rows], rests, bases, beams), _FEWEST)
+    return out
 
 
 def _promising(values: Floats, form: Form, aperture: Aperture, count: int, per_beam: int) -> Ints:
@@ -183,10 +214,15 @@ def _once(found: Floats, aperture: Aperture, count: int) -> Floats:
 
 def _deep_peaks(form: Form, aperture: Aperture, count: int, per_beam: int) -> Floats:
     """Return what `peaks` does of an array so deep that near the edge a grid in the cosines is too coarse."""
-    at = aperture.spread(per_beam)
-    batch = max(1, _BATCH // len(aperture.elements))
-    values = np.concatenate([form(aperture.steering(at[i : i + batch])) for i in range(0, len(at), batch)])
-    top = np.flatnonzero(values >= values[neighbours(aperture, at)].max(axis=1))
+    known = aperture.spreads.get(per_beam)
+    if known is None:
+        at = aperture.spread(per_beam)
+        known = at, neighbours(aperture, at)
+        if len(at) <= _KEPT:
+            aperture.spreads[per_beam] = known
+    at, beside = known
+    values = _at(form, aperture, at)
+    top = np.flatnonzero(values >= values[beside].max(axis=1))
     start = at[top[_promising(values[top], form, aperture, count, per_beam)]]
     found, heights = climb(form, aperture, start, aperture.grid(per_beam))
     return _once(nearest_boresight(aperture, found[np.argsort(-heights, kind="stable")]), aperture, count)
@@ -197,7 +233,7 @@ def climb(form: Form, aperture: Aperture, start: Floats, grid: Grid) -> tuple[Fl
     at, steps = np.array(start, float), steps_of(aperture, grid)
     if isinstance(form, Bartlett | Beside):
         best, (count, size) = np.empty(len(at)), form.snapshots.shape
-        basis = form.basis if isinstance(form, Beside) else np.zeros((0, size))
+        basis = form.basis if isinstance(form, Beside) else np.zeros((0, size), complex)
         climb_beams(at, best, snapshots_for(form.snapshots), snapshots_for(basis), beams_of(aperture, grid))
         return at, best if isinstance(form, Beside) else best / (count * size)
     best = form(aperture.steering(at))

@@ -6,7 +6,6 @@ sin(elevation). A plane wave from there has the phase 2 pi / wavelength times (e
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -207,6 +206,11 @@ class Aperture:
             rings.append(sine * np.stack([np.cos(turn), np.sin(turn)], axis=1))
         return np.concatenate(rings)
 
+    @cached_property
+    def spreads(self) -> dict[int, tuple[Floats, Ints]]:
+        """Directions (g, 2) of searches over `spread`, by its `per_beam`, and which (g, k) lie beside each."""
+        return {}
+
     def moved(self, cosines: Floats, axis: int, by: Any) -> Floats:
         """Return cosines (n, 2) moved along an axis by distances (n,) or one for all: of a deep array by angles, in the
         plane that it scans, or, of both axes, from boresight (0) and round it (1)."""
@@ -225,19 +229,17 @@ class Aperture:
         turned = np.clip(np.arcsin(np.clip(size, -1.0, 1.0)) + by, -0.5 * np.pi, 0.5 * np.pi)
         return np.asarray(along * np.sin(turned))
 
-    def scanned(self, per_beam: int) -> tuple[Grid, Iterable[Complexes]]:
-        """Return a grid of directions and the steering vectors (n, a) of its points, in batches that memory holds."""
+    def scanned(self, per_beam: int) -> Complexes | None:
+        """Return the steering vectors (n, a) of the points of a grid, kept for other searches; None of so many that
+        memory should not hold them."""
         if per_beam not in self._scanned:
-            grid = self.grid(per_beam)
-            batch = max(1, _KEPT // len(self.elements))
-            if len(grid.points) > batch:
-                parts = range(0, len(grid.points), batch)
-                return grid, (self.steering(grid.points[i : i + batch]) for i in parts)
-            self._scanned[per_beam] = grid, [self.steering(grid.points)]
+            points = self.grid(per_beam).points
+            small = len(points) * len(self.elements) <= _KEPT
+            self._scanned[per_beam] = self.steering(points) if small else None
         return self._scanned[per_beam]
 
     @cached_property
-    def _scanned(self) -> dict[int, tuple[Grid, list[Complexes]]]:
+    def _scanned(self) -> dict[int, Complexes | None]:
         return {}
 
     def canonical(self, cosines: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""Which bodies turn or move within a frame, and whether the frame needs more than one tracing for them."""
+"""Which bodies turn, pass or move within a frame, and whether the frame needs more than one tracing for them."""
 
 from __future__ import annotations
 
@@ -6,10 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.radar.waveform import OwnWaveform
+from raychan.records import MIRROR
+from raychan.world.body import Body
 from raychan.world.errors import SceneError
 from raychan.world.scene import Scene
 
 _NEEDED = 1.0  # rad: phase error of constant rates over a frame above which `auto` uses keyframes
+_FARTHEST = 0.375  # of a frame of three tracings: how far one is carried on at most (see segments.reach)
 _SLOWEST = 1e-9  # rad/s: a limb may stand still for a moment
 
 
@@ -30,8 +33,37 @@ def moves_as_one(scene: Scene) -> bool:
 
 
 def carried_on(scene: Scene, retrace: str | int) -> NDArray[np.bool_]:
-    """Return which bodies (b,) are extrapolated between tracings: those that turn, or all that move."""
-    return turning(scene) if retrace == "auto" else moving(scene)
+    """Return which bodies (b,) are extrapolated between tracings: those that turn or pass fast, or all that move."""
+    return turning(scene) | passing(scene) if retrace == "auto" else moving(scene)
+
+
+def passing(scene: Scene) -> NDArray[np.bool_]:
+    """Return which bodies (b,) pass the radar so fast that constant rates do not hold from the middle of the frame to
+    where those of another tracing take over: by the centripetal acceleration of their points. Targets that fluctuate
+    are left to constant rates, and so are mirrors, which slide in their own plane."""
+    wave, own = scene.radar.waveform, np.asarray(scene.radar.velocity, float)
+    allowed = _NEEDED * wave.wavelength / (2.0 * np.pi * (_FARTHEST * wave.frame_duration) ** 2)
+    return np.array(
+        [
+            body.resolved_role != MIRROR
+            and not body.fluctuates
+            and _centripetal(scene, body, body.motion.velocity - own) > allowed
+            for body in scene.bodies
+        ],
+        bool,
+    )
+
+
+def _centripetal(scene: Scene, body: Body, velocity: NDArray[np.float64]) -> float:
+    """Return the greatest acceleration [m/s^2] of the range of a body's points at mid-frame, at an even velocity (3,)
+    [m/s] relative to the radar."""
+    if not velocity.any():
+        return 0.0
+    away = body.motion.to_world(body.geometry.vertices) - np.asarray(scene.radar.position, float)
+    away = away + 0.5 * scene.radar.waveform.frame_duration * velocity
+    distance = np.maximum(np.linalg.norm(away, axis=1), scene.radar.waveform.wavelength)
+    across = float(velocity @ velocity) - (away @ velocity / distance) ** 2
+    return float((across / distance).max(initial=0.0))
 
 
 def bend(scene: Scene, edge: float) -> float:

@@ -7,7 +7,7 @@ import pytest
 
 from raychan.processing.climb_kernels import climb_beams, refine_beams, snapshots_for
 from raychan.processing.doa import amplitudes
-from raychan.processing.spectra import Bartlett, Beside, beams_of, climb
+from raychan.processing.spectra import Bartlett, Beside, beams_of, climb, explained_beside
 from raychan.radar.aperture import Aperture
 
 LAMBDA = 3.9e-3
@@ -45,6 +45,16 @@ def made(name, count=40, snapshots=3):
     size, turn = np.sqrt(rng.uniform(0.0, 1.0, count)), rng.uniform(0.0, 2.0 * np.pi, count)
     at = size[:, None] * np.stack([np.cos(turn), np.sin(turn)], axis=1)
     return array, data, at * array.scans
+
+
+@pytest.mark.parametrize("name", ARRAYS)
+def test_what_waves_explain_beside_sets_of_others_is_that_of_the_slow_form(name):
+    array, data, at = made(name)
+    sets = [np.linalg.qr(array.steering(at[i : i + 2]).T)[0].T for i in (0, 2, 4)]
+    rests = [data - (data @ basis.conj().T) @ basis for basis in sets]
+    slow = [Beside(rest, basis)(array.steering(at)) for rest, basis in zip(rests, sets, strict=True)]
+    found = explained_beside(np.array(rests), np.array(sets), array, at).T
+    assert found == pytest.approx(np.array(slow), abs=1e-9)
 
 
 @pytest.mark.parametrize("others", [0, 2])

@@ -9,6 +9,7 @@ import pytest
 from support.arrays import noise
 from support.echoes import SMALL, echoes, make_radar
 
+from raychan.processing import joint_search
 from raychan.processing.angles import echoes_in
 from raychan.processing.detection import detect
 from raychan.processing.doa import by_turns
@@ -109,3 +110,16 @@ def test_no_waves_a_beam_width_apart_explain_more_before_small_rectangles_than_t
         wave = np.exp(2j * np.pi * rng.random(count)) @ aperture.steering(true)
         data = wave[None] + 0.01 * rng.standard_normal((1, size, 2)).view(complex)[..., 0]
         assert explained(data, aperture, by_turns(data, aperture, count)) > explained(data, aperture, true) - 1e-3
+
+
+def test_the_best_pairs_are_found_where_memory_holds_few_beams_at_once(monkeypatch):
+    """Beams that none of the best pairs has are left out block by block."""
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        aperture = Aperture(rng.uniform(-3.0, 3.0, (12, 3)) * [0.0, 1.0, 1.0], 1.0)
+        data = received(rng, aperture, unlike(rng, aperture, 2))
+        assert len(aperture.grid(joint_search._PER_BEAM).points) > 700
+        with monkeypatch.context() as small:
+            pairs = joint_search._on_grid(data, aperture, 2)
+            small.setattr(joint_search, "_BATCH", 32 * 200)
+            assert joint_search._on_grid(data, aperture, 2)[:5].tolist() == pairs[:5].tolist()

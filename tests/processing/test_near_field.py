@@ -24,8 +24,8 @@ def sparse(count, seed):
     return np.column_stack([np.zeros(count), np.sort(places), np.zeros(count)])
 
 
-def run(elements, away, azimuths, levels, seed):
-    """Return the detections of point targets [dBsm] so far away [m]."""
+def run(elements, away, azimuths, levels, seed, **processing):
+    """Return what is found of point targets [dBsm] so far away [m]."""
     body = {"shape": "box", "rcs_point": (0.0, 0.0, 0.0)}
     places = [(away * np.cos(x), away * np.sin(x), 0.0) for x in azimuths]
     bodies = [
@@ -33,14 +33,15 @@ def run(elements, away, azimuths, levels, seed):
         for i, (at, level) in enumerate(zip(places, levels, strict=True))
     ]
     radar = rc.Radar(WAVE, elements=elements, position=(0.0, 0.0, 0.0), power=0.1 * (away / 20.0) ** 4)
-    return rc.simulate(rc.Scene(bodies, radar=radar, model={"max_bounces": 1}), seed=seed).detections
+    scene = rc.Scene(bodies, radar=radar, model={"max_bounces": 1}, processing=processing)
+    return rc.simulate(scene, seed=seed)
 
 
 @pytest.mark.parametrize("far", [0.05, 0.1, 0.2, 0.4])
 @pytest.mark.parametrize("count", [6, 10, 16])
 def test_a_lone_echo_before_a_sparse_line_is_where_it_is(count, far):
     azimuth = 0.3 - 0.05 * count + far
-    found = run(sparse(count, count), far * 2.0 * WIDTH**2 / LAMBDA, [azimuth], [10.0], 1)
+    found = run(sparse(count, count), far * 2.0 * WIDTH**2 / LAMBDA, [azimuth], [10.0], 1).detections
     assert len(found.azimuth) == 1
     assert np.sin(found.azimuth[0]) == pytest.approx(np.sin(azimuth), abs=0.5 * LAMBDA / WIDTH)
     assert not found.ambiguous[0]
@@ -50,8 +51,21 @@ def test_a_lone_echo_before_a_sparse_line_is_where_it_is(count, far):
 @pytest.mark.parametrize("seed", [2, 3])
 def test_two_echoes_of_a_cell_are_found_or_told(seed, far):
     azimuths = [0.05 * seed, -0.3]
-    found = run(sparse(12, seed), far * 2.0 * WIDTH**2 / LAMBDA, azimuths, [5.0, 2.0], seed)
+    found = run(sparse(12, seed), far * 2.0 * WIDTH**2 / LAMBDA, azimuths, [5.0, 2.0], seed).detections
     assert np.sin(np.sort(found.azimuth)) == pytest.approx(np.sin(np.sort(azimuths)), abs=0.5 * LAMBDA / WIDTH)
+
+
+@pytest.mark.parametrize("method", ["capon", "music", "esprit"])
+@pytest.mark.parametrize(("far", "below"), [(0.35, 6.0), (0.5, 12.0), (0.9, 15.0)])
+def test_methods_of_plane_waves_leave_near_echoes_to_bartlett_and_a_line_tells(method, far, below):
+    """What of the stronger wave is not plane hid the weaker one before a line half a wavelength apart."""
+    line, azimuths = rc.uniform_array(64, 0.5 * LAMBDA), [-0.5, 0.35]
+    away = far * 2.0 * float(np.ptp(line[:, 1])) ** 2 / LAMBDA
+    result = run(line, away, azimuths, [10.0, 10.0 - below], 1, doa=method)
+    assert np.sin(result.detections.azimuth) == pytest.approx(np.sin(azimuths), abs=0.02)
+    assert any(f"{method} takes waves to be plane" in line for line in result.warnings)
+    beyond = run(line, 20.0 * away, azimuths[:1], [10.0], 1, doa=method)
+    assert not any("takes waves" in line for line in beyond.warnings)
 
 
 @pytest.mark.parametrize("senders", [1, 3])

@@ -39,6 +39,18 @@ def lost(found: ExplainedDetections, reasons: Sequence[Explanation], radar: Rada
     return said
 
 
+def near_beams(found: ExplainedDetections, radar: Radar) -> list[str]:
+    """Return a line if detections are so near that beams of spherical waves stand in for another method."""
+    method, far = radar.processing.doa, far_field_distance(radar)
+    rows = np.asarray((found.range < far) & (np.isfinite(found.azimuth) | np.isfinite(found.elevation)))
+    if method == "bartlett" or not rows.any():
+        return []
+    return [
+        f"{share_of(rows)} {verb(rows)} in the near field of the array ({numbers(rows)}), nearer than 2 D^2 / "
+        f"wavelength = {far:.3g} m: {method} takes waves to be plane, so their directions are those of bartlett"
+    ]
+
+
 _NAMES = "the near field", "ranges that differ over the elements", "rates that do", "migration"
 
 

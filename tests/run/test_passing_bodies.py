@@ -1,0 +1,69 @@
+"""Frames that are traced several times for what turns: bodies that pass fast beside it are carried on with it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import raychan as rc
+from raychan.run.turning import carried_on, passing
+
+_WAVE = rc.Waveform(24e9, 300e6, 25e-6, 250e-6, n_chirps=128, n_samples=128)
+_SIZE = 0.5, 0.4
+_SPEED = np.array([0.0, 15.0, 0.0])
+_PLACE = np.array([7.0, -0.3, 0.7])
+
+
+def _scene(*bodies: rc.Body, **model: object) -> rc.Scene:
+    radar = rc.Radar(_WAVE, (0.0, 0.0, 0.7), noise=False)
+    return rc.Scene(bodies, radar=radar, model={"max_bounces": 1, "diffraction": False, **model})
+
+
+def _plate(name: str = "plate", **given: object) -> rc.Body:
+    size = dict(zip(("width", "height"), _SIZE, strict=True))
+    place = {"position": tuple(_PLACE), "velocity": tuple(_SPEED), "yaw_deg": 180.0}
+    return rc.Body(name, shape="plate", params=size, material="pec", **(place | given))
+
+
+_TURNING = rc.Body(
+    "turning", shape="box", params={"length": 0.5, "width": 0.3, "height": 0.4}, position=(9, -9, 0), turn_rate_dps=30.0
+)
+
+
+def _points_of_the_plate() -> np.ndarray:
+    """Return the samples (chirp, sample) of currents on the plate, each of its points moved from sample to sample."""
+    y, z = ((np.arange(n) + 0.5) / n * size - 0.5 * size for n, size in zip((120, 96), _SIZE, strict=True))
+    y, z = (a.ravel() for a in np.meshgrid(y, z))
+    k, area = 2.0 * np.pi / _WAVE.wavelength, _SIZE[0] * _SIZE[1] / len(y)
+    out = np.zeros((_WAVE.n_chirps, _WAVE.n_samples), complex)
+    for chirp in range(_WAVE.n_chirps):
+        at = _PLACE + _SPEED * _WAVE.repetition * chirp + np.stack([0.0 * y, y, z], axis=1) - [0.0, 0.0, 0.7]
+        distance = np.linalg.norm(at, axis=1)
+        shown = at[:, 0] / distance * area / distance**2
+        out[chirp, 0] = k * (shown * np.exp(-2j * k * distance)).sum()
+    return out[:, 0]
+
+
+def test_a_plate_that_passes_beside_a_turning_box_has_the_phases_and_levels_of_its_points():
+    """Sums over the plate's points at each ramp; with constant rates a sixth of the power is none of theirs."""
+    result = rc.simulate(_scene(_plate(), _TURNING, tolerance_db=0.5))
+    assert result.stats["tracings"] > 1
+    seen, asked = np.fft.fft(result.cube.samples[0], axis=1), _points_of_the_plate()
+    bin_ = int(np.argmax((np.abs(seen) ** 2).sum(axis=0)))
+    seen = seen[:, bin_]
+    share = np.vdot(asked, seen)
+    assert abs(share) ** 2 / (np.vdot(asked, asked).real * np.vdot(seen, seen).real) == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_body_passes_that_is_near_and_crosses_fast():
+    far = _plate("far", position=(90.0, 0.0, 0.7))
+    along = _plate(velocity=(15.0, 0.0, 0.0), position=(20.0, 0.0, 0.7))
+    target = _plate(rcs_dbsm=0.0, swerling=1)
+    road = rc.Body("road", shape="ground", velocity=(0.0, 15.0, 0.0))
+    for body, passes in ((_plate(), True), (far, False), (along, False), (target, False), (road, False)):
+        assert passing(_scene(body)).tolist() == [passes]
+    driving = rc.Radar(_WAVE, (0.0, 0.0, 0.7), velocity=tuple(_SPEED))
+    beside = rc.Scene([_plate(), _plate("standing", velocity=(0.0, 0.0, 0.0))], radar=driving)
+    assert passing(beside).tolist() == [False, True]
+    assert carried_on(_scene(_plate(), far, _TURNING), "auto").tolist() == [True, False, True]
+    assert carried_on(_scene(_plate(), far, _TURNING), 9).tolist() == [True, True, True]
