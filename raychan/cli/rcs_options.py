@@ -47,6 +47,8 @@ def writable(file: Path | None, endings: tuple[str, ...]) -> None:
         raise typer.BadParameter(f"{file}: must end in {' or '.join(endings)}")
     if not file.parent.is_dir():
         raise typer.BadParameter(f"{file}: there is no directory {file.parent}")
+    if file.is_dir():
+        raise typer.BadParameter(f"{file}: is a directory; name a file")
     if not os.access(file.parent, os.W_OK):
         raise typer.BadParameter(f"{file}: the directory {file.parent} cannot be written to")
 

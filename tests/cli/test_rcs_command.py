@@ -146,13 +146,16 @@ def test_many_elevations_are_drawn_as_a_map(plate, tmp_path):
         (["tests/none.ply", "--crease", "181"], "between 0 and 180 deg"),
         (["--shape", "plate", "--out", "no/such/place.csv"], "no directory"),
         (["--shape", "plate", "--out", "table.txt"], ".csv"),
+        (["--shape", "plate", "--out", "{directory}"], "is a directory; name a file"),
         (["--shape", "plate", "--plot", "picture.tiff"], ".png"),
         (["--shape", "plate", "--polar"], "--plot"),
         (["--shape", "plate", "--polar", "--plot", "a.png", "--azimuth=0:9:1", "--elevation=0:8:1"], "at most 8"),
     ],
 )
-def test_wrong_input_ends_with_2_and_says_what_is_allowed(argv, says, capsys):
-    assert invoke(["rcs", *argv]) == 2
+def test_wrong_input_ends_with_2_and_says_what_is_allowed(argv, says, tmp_path, capsys):
+    directory = tmp_path / "taken.csv"
+    directory.mkdir()
+    assert invoke(["rcs", *(word.format(directory=directory) for word in argv)]) == 2
     said = capsys.readouterr()
     assert says in said.err and "Traceback" not in said.err
     assert said.out == ""

@@ -92,7 +92,7 @@ def test_an_stl_cut_short_says_how_many_bytes_are_missing(size, tmp_path):
     file.write_bytes(trimesh.creation.box().export(file_type="stl")[:size])
     ran = CliRunner().invoke(app, ["info", str(file)])
     assert isinstance(ran.exception, rc.SceneError)
-    assert f"cut short: {size} bytes there" in str(ran.exception)
+    assert f"cut short, or no STL: {size} bytes there" in str(ran.exception)
 
 
 def test_a_long_frame_of_fast_bodies_is_told_to_take_longer_than_one_that_stands():

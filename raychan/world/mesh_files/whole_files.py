@@ -43,7 +43,7 @@ def _whole_binary_stl(file: Path) -> None:
     expected = _STL_HEAD + _STL_FACET * count
     if there < expected:
         least = "" if there >= _STL_HEAD else "at least "
-        problem = f"is cut short: {there} bytes there, {least}{expected} expected ({count} triangles)"
+        problem = f"is cut short, or no STL: {there} bytes there, {least}{expected} expected ({count} triangles)"
         raise SceneError(problem, file=file, value=there, allowed="a whole STL")
     if there > expected:
         problem = f"does not end with its {count} triangles: {there} bytes there, {expected} expected"
