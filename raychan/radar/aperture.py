@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.radar.lobes import Lobes, of_places, on_rectangle
-from raychan.radar.measured import SAME, beam_width, measured
+from raychan.radar.measured import SAME, beam_width, common_pitch, measured
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -93,7 +93,7 @@ class Aperture:
     @cached_property
     def pitch(self) -> Floats:
         """Lattice spacing (2,) [m] along y and z: the greatest of which all spacings are multiples; 0 for one row."""
-        return np.array([_pitch(x, SAME * self.wavelength) for x in self.places.T])
+        return np.array([common_pitch(x, SAME * self.wavelength) for x in self.places.T])
 
     @cached_property
     def period(self) -> Floats:
@@ -289,14 +289,3 @@ def cosines(azimuth: Any, elevation: Any = 0.0) -> Floats:
     """Return the cosines (n, 2) along y and z of azimuths and elevations (n,) [rad]."""
     az, el = np.broadcast_arrays(np.atleast_1d(np.asarray(azimuth, float)), np.asarray(elevation, float))
     return np.stack([np.cos(el) * np.sin(az), np.sin(el)], axis=1)
-
-
-def _pitch(x: Floats, tolerance: float) -> float:
-    """Return the greatest length of which all distances of numbers (n,) are multiples, by Euclid's algorithm."""
-    ordered = np.unique(x)
-    found = 0.0
-    for step in (float(s) for s in np.diff(ordered) if s > tolerance):
-        other = step
-        while other > tolerance:
-            found, other = other, abs(found - other * np.rint(found / other))
-    return found

@@ -1,4 +1,7 @@
-"""Which angles elements measure: along an axis over which they spread too little, noise alone would tell directions."""
+"""Which angles elements measure, how finely, and on which lattice they stand.
+
+Along an axis over which they spread too little, noise alone would tell directions.
+"""
 
 from __future__ import annotations
 
@@ -38,6 +41,17 @@ def measured(elements: Floats, wavelength: float) -> tuple[bool, bool]:
     axis = int(abs(along[1]) > abs(along[0]) * (1.0 + _TIE))
     told = beam_width(across[:, axis], wavelength) <= _WIDEST
     return told and axis == 0, told and axis == 1
+
+
+def common_pitch(x: Floats, tolerance: float) -> float:
+    """Return the greatest length of which all distances of numbers (n,) are multiples, by Euclid's algorithm."""
+    ordered = np.unique(x)
+    found = 0.0
+    for step in (float(s) for s in np.diff(ordered) if s > tolerance):
+        other = step
+        while other > tolerance:
+            found, other = other, abs(found - other * np.rint(found / other))
+    return found
 
 
 def beside_line(along: Floats, aside: Floats, extent: float) -> float:
