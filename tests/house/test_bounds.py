@@ -13,21 +13,10 @@ from support.places import SCENES, TESTS
 
 from raychan import rcs
 from raychan.cli import invoke
-from raychan.compile.jit import njit
 from raychan.geometry.triangles import half_edge_ends
 from raychan.world.scene_files import bundled
 
 SCENE_FILES = [SCENES / f"{name}.toml" for name in bundled.names()]
-
-
-@njit(cache=True)
-def _add_one(here, there):  # type: ignore[no-untyped-def]
-    """Add 1 to the first element of arrays (n,), alone and in tuples."""
-    here[0] += 1.0
-    for x in there:
-        x[0] += 1.0
-
-
 checked = pytest.mark.skipif(not os.environ.get("NUMBA_BOUNDSCHECK"), reason="wants NUMBA_BOUNDSCHECK=1")
 
 
@@ -35,18 +24,6 @@ checked = pytest.mark.skipif(not os.environ.get("NUMBA_BOUNDSCHECK"), reason="wa
 def test_a_read_beyond_an_array_is_caught():
     with pytest.raises(IndexError):
         half_edge_ends(facets([ground()]).vertices, np.array([99]))
-
-
-@checked
-@pytest.mark.filterwarnings("ignore")  # a kernel of a test may have no file to be cached beside
-def test_a_write_to_a_read_only_array_is_told():
-    kept = np.zeros(3)
-    _add_one(kept, (kept,))
-    assert kept.tolist() == [2.0, 0.0, 0.0]
-    kept.flags.writeable = False
-    for given in ((kept, ()), (np.zeros(3), (kept,))):
-        with pytest.raises(ValueError, match="_add_one writes to a read-only array"):
-            _add_one(*given)
 
 
 @checked

@@ -43,12 +43,13 @@ def other(place, wave=WAVE, locked=True, **given):
 
 def test_phase_noise_converter_rain_interferer_clutter_and_a_fluctuating_target_in_one_run_of_a_2_x_8_array():
     scene = rc.Scene.from_text(EVERYTHING)
-    one = rc.simulate(scene, seed=3)
+    # Of clutter little is above that, and seeking its directions takes most of the time.
+    one = rc.simulate(scene.override(["processing.min_snr_db=40"]), seed=3)
     assert one.cube.samples.shape == (8, 64, 128) and one.rdmap.spectrum.shape[0] == 16
     assert np.isfinite(one.cube.samples).all() and np.isfinite(one.rdmap.power).all()
-    # Of two more runs the samples are looked at only.
-    again, other = (rc.simulate(scene.override(["processing.min_snr_db=100"]), seed=seed) for seed in (3, 4))
-    assert one.cube.samples.tobytes() == again.cube.samples.tobytes() != other.cube.samples.tobytes()
+    # Of another run the samples are looked at only.
+    again = rc.simulate(scene.override(["processing.min_snr_db=100"]), seed=3)
+    assert one.cube.samples.tobytes() == again.cube.samples.tobytes()
     found, asked = one.detections, np.hypot(18.0, 6.0)
     post = int(np.argmax(np.where(np.abs(found.range - asked) < 0.5, found.power, 0.0)))
     assert found.range[post] == pytest.approx(asked, abs=0.15)

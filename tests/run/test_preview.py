@@ -90,7 +90,7 @@ def test_a_plate_larger_than_tubes_returns_as_in_a_fine_run():
     assert 10.0 * np.log10(coarse.detections.power[0] / fine.detections.power[0]) == pytest.approx(0.0, abs=0.5)
 
 
-@pytest.mark.parametrize(("size", "yaw"), [(40.0, 180.0), (400.0, 180.0), (2000.0, 168.0)])
+@pytest.mark.parametrize(("size", "yaw"), [(40.0, 180.0), (400.0, 168.0)])
 def test_a_plane_face_of_any_size_mirrors_the_radar_from_its_foot_point(size, yaw):
     """A face many Fresnel zones wide returns as the image of the radar behind it: sigma = pi d^2."""
     plate = rc.Body("plate", shape="plate", params={"width": size, "height": size}, position=(9, 0, 1), yaw_deg=yaw)
