@@ -6,11 +6,18 @@ import numpy as np
 import pytest
 
 import raychan as rc
+from raychan.processing.scan import Scan
 from raychan.radar.array import mimo_array, uniform_array
 from raychan.run.receiver_losses import beam_losses, far_field_distance, migration, near_field_losses, range_spread
 from raychan.units import C0
 
 STEP = 0.5 * C0 / 77e9
+
+
+@pytest.fixture(autouse=True)
+def music_stays_with_plane_waves(monkeypatch):
+    """Let music seek near echoes as plane waves, as any method does where curvature is below the noise."""
+    monkeypatch.setattr(Scan, "_far", 0.0)
 
 
 def run(
@@ -44,7 +51,7 @@ def test_a_beam_loses_what_is_told_of_a_spherical_wave(receivers, place):
     near, radar = run(place, elements=elements, doa="music")
     loss = near_field_losses(near.detections, radar)
     assert loss == pytest.approx([level(run(place)[0]) - level(near)], abs=0.06)
-    said = [x for x in near.warnings if "near field" in x]
+    said = [x for x in near.warnings if "near field" in x and "dB less" in x]
     assert len(said) == (loss[0] > 0.5)
     assert all(f"{up(loss[0])} dB less" in x and f"= {far_field_distance(radar):.3g} m" in x for x in said)
 
@@ -191,3 +198,26 @@ def test_before_an_array_that_detects_nothing_nothing_is_lost():
     result = rc.simulate(rc.Scene([target], radar=radar))
     assert not len(result.detections.range)
     assert not len(beam_losses(result.detections, result.provenance, radar).whole)
+
+
+@pytest.mark.parametrize(("cell", "least"), [(0.264, 5), (1.0, None)])
+def test_a_line_tells_where_ranges_that_differ_over_the_elements_hide_echoes_of_a_cell(cell, least):
+    """Three points of 42, 36 and 30 dB, far apart before a sparse line 0.49 m wide: the weakest is lost."""
+    places = 0.5 * C0 / 24e9 * np.array([-40, -39, -32, -16, -11, -5, -4, -2, 0, 3, 8, 9, 11, 13, 14, 17, 34, 39])
+    waveform = rc.Waveform(24e9, C0 / 2.0 / cell, 20e-6, 25e-6, n_chirps=24, n_samples=128)
+    bodies = [
+        rc.Body(
+            f"t{k}",
+            shape="sphere",
+            params={"radius": 0.005},
+            rcs_dbsm=-6.0 * k,
+            position=(away * np.sqrt(1.0 - u**2), away * u, 0.0),
+        )
+        for k, (away, u) in enumerate([(10.54, -0.675), (10.57, 0.628), (10.53, -0.1745)])
+    ]
+    elements = np.stack([0.0 * places, places, 0.0 * places], axis=1)
+    radar = rc.Radar(waveform, (0.0, 0.0, 0.0), power=1.16e-2, noise_figure_db=12.0, elements=elements)
+    result = rc.simulate(rc.Scene(bodies, radar=radar, model={"max_bounces": 1}), seed=9)
+    told = [line for line in result.warnings if "may hide echoes of their cells" in line]
+    assert len(result.detections.range) == (3 if least is None else 2)
+    assert [f"over {least} dB weaker (numbers 1, 2)" in line for line in told] == [True] * (least is not None)

@@ -17,6 +17,7 @@ Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 _LOST_DB = 0.5  # by what a receiver makes of an echo: less is as much as levels are asked for, by default
+_HIDES = 0.02  # of an echo's power: of 60 cells of three echoes 12 dB apart none is lost where it is less
 _COUNTED_DB = 0.05  # of a cause beside another one: from here on a line names it
 
 
@@ -36,7 +37,23 @@ def lost(found: ExplainedDetections, reasons: Sequence[Explanation], radar: Rada
             others = [k for k in range(len(each)) if k != cause and each[k, rows].max() > _COUNTED_DB]
             counted = f" ({' and '.join(_NAMES[k] for k in others)} counted in)" if others else ""
             said.append(tell(rows, f"{_up(whole[rows].max())} dB less", counted, beams, moved, radar))
-    return said
+    return said + _hiding(found, wave, beams, radar)
+
+
+def _hiding(found: ExplainedDetections, wave: Bools, beams: BeamLosses, radar: Radar) -> list[str]:
+    """Return a line where so much of detections lies in other cells that it hides echoes of theirs that would be
+    detected: the slope of the window's response over the elements, as in `Scan.misfit`, twice where several add up."""
+    share = 2.0 * beams.range_cells**2 / 3.0
+    hides = found.snr + 10.0 * np.log10(np.maximum(share, 1e-30)) > radar.processing.min_snr_db
+    rows = np.asarray(wave & hides & (share > _HIDES))
+    if not rows.any():
+        return []
+    least, one = max(math.floor(-10.0 * math.log10(share[rows].max())), 0), rows.sum() == 1
+    return [
+        f"{share_of(rows)} may hide echoes of {'its cell' if one else 'their cells'} over {least} dB weaker "
+        f"({numbers(rows)}): {'its ranges differ' if one else 'their ranges differ'} over the elements by up to "
+        f"{beams.range_cells[rows].max():.2f} cells"
+    ]
 
 
 def near_beams(found: ExplainedDetections, radar: Radar) -> list[str]:
