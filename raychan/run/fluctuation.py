@@ -29,7 +29,7 @@ def check(scene: Scene, turned: NDArray[np.bool_]) -> None:
     """Raise SceneError where a fluctuating target is among the bodies (b,) that are carried on between tracings."""
     for body, turns in zip(scene.bodies, turned, strict=True):
         if body.fluctuates and turns:
-            key, allowed = f"bodies.{body.name}.swerling", "0 on a body that turns, or model.retrace = 1"
+            key, allowed = f"bodies.{body.name}.swerling", "0 on a body that turns or moves, or model.retrace = 1"
             raise SceneError("a frame traced more than once", key=key, value=body.swerling, allowed=allowed)
 
 

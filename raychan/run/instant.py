@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from raychan.run.rules import fine_rule
-from raychan.run.turning import check_often, middle_chirp, moves_as_one, needed
+from raychan.run.turning import check_often, fluctuating, middle_chirp, moves_as_one, needed
 from raychan.world.errors import SceneError
 from raychan.world.scene import Scene
 from raychan.world.scene_files.schema import PREVIEW
@@ -48,4 +48,14 @@ def traced_at(scene: Scene, model: Any) -> Instant:
         return Instant(scene, scene, 0.0, often, (late,))
     # The same scene stands alike at each run of it.
     then._derived = scene._derived.setdefault(("at", time), {})
-    return Instant(scene, then, time, often)
+    return Instant(scene, then, time, often, _uneven(scene) if often else ())
+
+
+def _uneven(scene: Scene) -> tuple[str, ...]:
+    """Return a line if targets fluctuate that should be carried on between tracings."""
+    if not (names := fluctuating(scene)):
+        return ()
+    return (
+        f"{', '.join(names)} fluctuate and pass while others turn: rates are constant from one tracing to the next, so "
+        "levels are off and echoes beside theirs may be none (model.retrace = 1 traces the frame once)",
+    )

@@ -12,6 +12,9 @@ from raychan.world.errors import SceneError
 from raychan.world.scene import Scene
 
 _NEEDED = 1.0  # rad: phase error of constant rates over a frame above which `auto` uses keyframes
+_PASSING = 1e-3
+"""rad: phase error of constant rates between tracings above which bodies that pass are carried on. Where those of two
+tracings meet, 0.05 rad make echoes that are none 50 dB below a plate's, 0.3 rad 25 dB below."""
 _FARTHEST = 0.375  # of a frame of three tracings: how far one is carried on at most (see segments.reach)
 _SLOWEST = 1e-9  # rad/s: a limb may stand still for a moment
 
@@ -38,20 +41,29 @@ def carried_on(scene: Scene, retrace: str | int) -> NDArray[np.bool_]:
 
 
 def passing(scene: Scene) -> NDArray[np.bool_]:
-    """Return which bodies (b,) pass the radar so fast that constant rates do not hold from the middle of the frame to
-    where those of another tracing take over: by the centripetal acceleration of their points. Targets that fluctuate
-    are left to constant rates, and so are mirrors, which slide in their own plane."""
+    """Return which bodies (b,) pass the radar so fast that constant rates do not hold from one tracing of a frame to
+    where those of another take over: by the centripetal acceleration of their points. Targets that fluctuate are left
+    to constant rates, and so are mirrors, which slide in their own plane."""
+    return np.array([_passes(scene, body) and not body.fluctuates for body in scene.bodies], bool)
+
+
+def fluctuating(scene: Scene) -> tuple[str, ...]:
+    """Return the names of targets that pass so, but fluctuate."""
+    return tuple(body.name for body in scene.bodies if body.fluctuates and _passes(scene, body))
+
+
+def _passes(scene: Scene, body: Body) -> bool:
+    """Return whether constant rates are too far off the ranges of a body's points between tracings of a frame."""
+    return _phase_error(scene, body, _FARTHEST) > _PASSING
+
+
+def _phase_error(scene: Scene, body: Body, share: float) -> float:
+    """Return the phase error [rad] of constant rates over a share of a frame, of a body that moves evenly."""
+    if body.resolved_role == MIRROR:
+        return 0.0
     wave, own = scene.radar.waveform, np.asarray(scene.radar.velocity, float)
-    allowed = _NEEDED * wave.wavelength / (2.0 * np.pi * (_FARTHEST * wave.frame_duration) ** 2)
-    return np.array(
-        [
-            body.resolved_role != MIRROR
-            and not body.fluctuates
-            and _centripetal(scene, body, body.motion.velocity - own) > allowed
-            for body in scene.bodies
-        ],
-        bool,
-    )
+    bent = _centripetal(scene, body, np.asarray(body.motion.velocity, float) - own)
+    return 2.0 * np.pi / wave.wavelength * bent * (share * wave.frame_duration) ** 2
 
 
 def _centripetal(scene: Scene, body: Body, velocity: NDArray[np.float64]) -> float:
@@ -84,10 +96,15 @@ def bend(scene: Scene, edge: float) -> float:
 
 
 def needed(scene: Scene, retrace: str | int, edge: float) -> bool:
-    """Return whether a frame needs more than one tracing."""
+    """Return whether a frame needs more than one tracing: where bodies turn, also for what passes beside them."""
     if retrace == 1 or scene.radar.waveform.n_chirps < 3:
         return False
-    return bend(scene, edge) > _NEEDED if retrace == "auto" else bool(moving(scene).any())
+    if retrace != "auto":
+        return bool(moving(scene).any())
+    if bend(scene, edge) > _NEEDED:
+        return True
+    passes = turning(scene).any() and not _refused(scene)
+    return bool(passes and max(_phase_error(scene, body, 0.5) for body in scene.bodies) > _NEEDED)
 
 
 def middle_chirp(chirps: int) -> int:
@@ -97,6 +114,14 @@ def middle_chirp(chirps: int) -> int:
 
 def check_often(scene: Scene, retrace: str | int) -> None:
     """Raise SceneError for a scene whose frames are traced once only."""
+    moves = "turn" if retrace == "auto" else "move or turn relative to the radar"
+    for what in _refused(scene):
+        problem = f"{retrace!r} given: with {what} a frame in which bodies {moves} is traced once"
+        raise SceneError(problem, file=scene.path, key="model.retrace", value=retrace, allowed="1")
+
+
+def _refused(scene: Scene) -> list[str]:
+    """Return what of a scene lets its frames be traced once only."""
     radar = scene.radar
     refused = {
         "staggered repetition (radar.waveform.stagger_us)": bool(radar.waveform.stagger),
@@ -104,7 +129,4 @@ def check_often(scene: Scene, retrace: str | int) -> None:
         "receivers elsewhere (radar.rx_position)": radar.rx_position is not None,
         "a waveform of one's own (a subclass of Waveform)": isinstance(radar.waveform, OwnWaveform),
     }
-    moves = "turn" if retrace == "auto" else "move or turn relative to the radar"
-    for what in (name for name, given in refused.items() if given):
-        problem = f"{retrace!r} given: with {what} a frame in which bodies {moves} is traced once"
-        raise SceneError(problem, file=scene.path, key="model.retrace", value=retrace, allowed="1")
+    return [name for name, given in refused.items() if given]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from raychan.columns import take
 from raychan.radar.radar import Radar
+from raychan.radar.side_lobes import main_lobe
 from raychan.records import Detections, MapError, Paths, RangeDoppler
 from raychan.run.convergence import figure
 from raychan.run.explanation.directions import UNEXPLAINED
@@ -40,12 +41,15 @@ def without(paths: Paths, turns: NDArray[np.bool_]) -> Paths:
     return kept
 
 
-def launch_share(paths: Paths, others: Paths, turns: NDArray[np.bool_], radar: Radar) -> float:
-    """Return the relative power by which two launches differ in the echoes of turning bodies over the first ramp."""
-    one = replace(radar, noise=False, waveform=replace(radar.waveform, n_chirps=1))
-    a, b = (synthesize(take(p, meets(p, turns)), one).samples for p in (paths, others))
-    power = float((np.abs(a) ** 2).sum())
-    return float((np.abs(a - b) ** 2).sum()) / power if power > 0.0 else 0.0
+def launch_share(paths: Paths, others: Paths, turns: NDArray[np.bool_], radar: Radar, settings: Any) -> Floats:
+    """Return the relative power (r,) by which two launches differ in the echoes of bodies that are carried on, over the
+    main lobe about each range of the map: of each body by itself where they stand at ranges of their own."""
+    own = replace(radar, noise=False)
+    a, b = (synthesize(take(p, meets(p, turns)), own).samples for p in (paths, others))
+    half = main_lobe(settings.range_window, radar.waveform.n_samples) * settings.pad[1]
+    lobe = np.ones(2 * int(np.ceil(half)) + 1)
+    power, change = (np.convolve(quiet_map(x, radar, settings).sum(axis=0), lobe, "same") for x in (a, a - b))
+    return np.divide(change, power, out=np.zeros(len(power)), where=power > 0.0)
 
 
 def motion(turned: Retraced) -> Entry:

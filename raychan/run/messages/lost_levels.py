@@ -8,8 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from raychan.processing.scan import PLANE_FROM, far_field
 from raychan.radar.radar import Radar
 from raychan.run.numbered import numbers, share_of, verb
+from raychan.run.receiver import aperture_of
 from raychan.run.receiver_losses import BeamLosses, beam_losses, beside, far_field_distance, migration
 from raychan.run.result import DC, ExplainedDetections, Explanation
 
@@ -57,14 +59,15 @@ def _hiding(found: ExplainedDetections, wave: Bools, beams: BeamLosses, radar: R
 
 
 def near_beams(found: ExplainedDetections, radar: Radar) -> list[str]:
-    """Return a line if detections are so near that beams of spherical waves stand in for another method."""
-    method, far = radar.processing.doa, far_field_distance(radar)
+    """Return a line if detections show so near that beams of spherical waves stand in for another method."""
+    method, far = radar.processing.doa, PLANE_FROM * far_field(aperture_of(radar))
     rows = np.asarray((found.range < far) & (np.isfinite(found.azimuth) | np.isfinite(found.elevation)))
     if method == "bartlett" or not rows.any():
         return []
     return [
-        f"{share_of(rows)} {verb(rows)} in the near field of the array ({numbers(rows)}), nearer than 2 D^2 / "
-        f"wavelength = {far:.3g} m: {method} takes waves to be plane, so their directions are those of bartlett"
+        f"{share_of(rows)} {'shows' if rows.sum() == 1 else 'show'} nearer than 4 D^2 / wavelength = {far:.3g} m "
+        f"({numbers(rows)}), D the width of the array: {method} takes waves to be plane, so directions there are those "
+        "of bartlett"
     ]
 
 
