@@ -2,22 +2,35 @@
 
 from __future__ import annotations
 
+from importlib import import_module
+
+import pytest
+
 from raychan.cli import invoke
 
 
-def test_a_figure_that_cannot_be_written_leaves_the_table(tmp_path, capsys):
-    """The directory takes files, but the figure's name is that of a directory."""
+@pytest.mark.parametrize("taken", ["t.csv", "f.png"])
+def test_a_directory_in_the_place_of_a_file_is_refused_before_anything_is_computed(taken, tmp_path, capsys):
     out, png = tmp_path / "t.csv", tmp_path / "f.png"
-    png.mkdir()
+    (tmp_path / taken).mkdir()
     assert invoke(["rcs", "--shape", "plate", "--out", str(out), "--plot", str(png)]) == 2
     told = capsys.readouterr()
-    assert "is a directory" in told.err and str(out) in told.err and "RCS dBsm" in told.out
-    assert len(out.read_text().splitlines()) == 2
-    out.unlink()
-    out.mkdir()
-    png.rmdir()
+    assert f"{taken}: is a directory; name a file" in told.err and told.out == ""
+    assert [path.name for path in tmp_path.iterdir()] == [taken]
+
+
+@pytest.mark.parametrize("taken", ["t.csv", "f.png"])
+def test_where_one_file_cannot_be_written_the_table_is_printed(taken, tmp_path, monkeypatch, capsys):
+    """The directory takes files, but a name is taken by another directory while the angles are computed."""
+    out, png = tmp_path / "t.csv", tmp_path / "f.png"
+    monkeypatch.setattr(
+        import_module("raychan.cli.rcs"), "writable", lambda *_: (tmp_path / taken).mkdir(exist_ok=True)
+    )
     assert invoke(["rcs", "--shape", "plate", "--out", str(out), "--plot", str(png)]) == 2
-    assert "RCS dBsm" in capsys.readouterr().out and not png.exists()
+    told = capsys.readouterr()
+    assert "is a directory" in told.err and "RCS dBsm" in told.out
+    assert out.is_dir() or (str(out) in told.err and len(out.read_text().splitlines()) == 2)
+    assert png.is_dir() or not png.exists()
 
 
 def test_a_ball_too_large_for_its_sag_is_named_by_its_own_radius(capsys):
