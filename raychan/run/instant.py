@@ -56,6 +56,6 @@ def _uneven(scene: Scene) -> tuple[str, ...]:
     if not (names := fluctuating(scene)):
         return ()
     return (
-        f"{', '.join(names)} fluctuate and pass while others turn: rates are constant from one tracing to the next, so "
-        "levels are off and echoes beside theirs may be none (model.retrace = 1 traces the frame once)",
+        f"{', '.join(names)}: what fluctuates and passes while others turn has constant rates from one tracing to the "
+        "next, so levels are off, and echoes beside it may be none (model.retrace = 1 traces the frame once)",
     )

@@ -14,7 +14,7 @@ from raychan.world.scene import Scene
 _NEEDED = 1.0  # rad: phase error of constant rates over a frame above which `auto` uses keyframes
 _PASSING = 1e-3
 """rad: phase error of constant rates between tracings above which bodies that pass are carried on. Where those of two
-tracings meet, 0.05 rad make echoes that are none 50 dB below a plate's, 0.3 rad 25 dB below."""
+tracings meet, 0.05 rad made echoes that are none 70 dB below a plate's, 0.2 rad 40 dB, 0.5 rad 35 dB below."""
 _FARTHEST = 0.375  # of a frame of three tracings: how far one is carried on at most (see segments.reach)
 _SLOWEST = 1e-9  # rad/s: a limb may stand still for a moment
 

@@ -91,9 +91,9 @@ def test_a_plate_that_passes_beside_a_turning_box_is_one_echo_and_each_has_its_o
 def test_a_line_names_targets_that_fluctuate_while_they_pass_what_turns():
     """They are left to constant rates."""
     target = _plate("target", rcs_dbsm=10.0, swerling=1)
-    told = [line for line in rc.simulate(_scene(target, _TURNING)).warnings if "fluctuate and pass" in line]
+    told = [line for line in rc.simulate(_scene(target, _TURNING)).warnings if "fluctuates and passes" in line]
     assert len(told) == 1 and told[0].startswith("target")
-    assert not any("fluctuate and pass" in line for line in rc.simulate(_scene(target)).warnings)
+    assert not any("fluctuates and passes" in line for line in rc.simulate(_scene(target)).warnings)
 
 
 @pytest.mark.parametrize("tolerance", [0.5, 0.05])

@@ -46,9 +46,9 @@ def launch_share(paths: Paths, others: Paths, turns: NDArray[np.bool_], radar: R
     main lobe about each range of the map: of each body by itself where they stand at ranges of their own."""
     own = replace(radar, noise=False)
     a, b = (synthesize(take(p, meets(p, turns)), own).samples for p in (paths, others))
-    half = main_lobe(settings.range_window, radar.waveform.n_samples) * settings.pad[1]
-    lobe = np.ones(2 * int(np.ceil(half)) + 1)
-    power, change = (np.convolve(quiet_map(x, radar, settings).sum(axis=0), lobe, "same") for x in (a, a - b))
+    half = int(np.ceil(main_lobe(settings.range_window, radar.waveform.n_samples) * settings.pad[1]))
+    levels = (quiet_map(x, radar, settings).sum(axis=0) for x in (a, a - b))
+    power, change = (np.convolve(x, np.ones(2 * half + 1))[half : half + len(x)] for x in levels)
     return np.divide(change, power, out=np.zeros(len(power)), where=power > 0.0)
 
 
