@@ -202,7 +202,7 @@ def _error_of(channel: Channel, radar: Radar, settings: Any) -> MapError:
         return MapError(map_error(channel.quiet, channel.others.quiet, radar, settings).power + below)
     paths, others = channel.launched.paths, channel.others.paths
     brought, doubt = (quiet_map(x, radar, settings) for x in (turned.turning, turned.error))
-    share = launch_share(paths, others, turned.turns, radar, settings)
+    share = launch_share(paths, others, turned.turns, brought, radar, settings)
     rest, others_rest = (without(x, turned.turns) for x in (paths, others))
     standing = map_error(synthesize(rest, radar), synthesize(others_rest, radar), radar, settings)
     return MapError(standing.power + doubt + share * brought + below)

@@ -41,15 +41,21 @@ def without(paths: Paths, turns: NDArray[np.bool_]) -> Paths:
     return kept
 
 
-def launch_share(paths: Paths, others: Paths, turns: NDArray[np.bool_], radar: Radar, settings: Any) -> Floats:
-    """Return the relative power (r,) by which two launches differ in the echoes of bodies that are carried on, over the
-    main lobe about each range of the map: of each body by itself where they stand at ranges of their own."""
+def launch_share(
+    paths: Paths, others: Paths, turns: NDArray[np.bool_], brought: Floats, radar: Radar, settings: Any
+) -> Floats:
+    """Return the relative power (r,) by which two launches at mid-frame differ in the echoes of bodies that are carried
+    on, over the main lobe about each range of the map: of each body by itself where they stand at ranges of their own.
+
+    Args: brought, map (v, r) [W] of these echoes; where mid-frame has little of it, all ranges together count too."""
     own = replace(radar, noise=False)
     a, b = (synthesize(take(p, meets(p, turns)), own).samples for p in (paths, others))
     half = int(np.ceil(main_lobe(settings.range_window, radar.waveform.n_samples) * settings.pad[1]))
-    levels = (quiet_map(x, radar, settings).sum(axis=0) for x in (a, a - b))
-    power, change = (np.convolve(x, np.ones(2 * half + 1))[half : half + len(x)] for x in levels)
-    return np.divide(change, power, out=np.zeros(len(power)), where=power > 0.0)
+    levels = [x.sum(axis=0) for x in (quiet_map(a, radar, settings), quiet_map(a - b, radar, settings), brought)]
+    power, change, there = (np.convolve(x, np.ones(2 * half + 1))[half : half + len(x)] for x in levels)
+    share = np.divide(change, power, out=np.zeros(len(power)), where=power > 0.0)
+    whole = float(change.sum() / power.sum()) if power.any() else 0.0
+    return np.where(power >= UNEXPLAINED * there, share, np.maximum(share, whole))
 
 
 def motion(turned: Retraced) -> Entry:
