@@ -13,6 +13,7 @@ import hashlib
 import operator
 import zlib
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numba
@@ -27,10 +28,14 @@ from numba.core.sigutils import normalize_signature
 from raychan.compile.code_cache import CodeCache, unkept
 from raychan.compile.linked import FITS, machine_code_where_called
 from raychan.compile.quick_numba import quick_numba
+from raychan.compile.returned import arrays_at_once
 from raychan.compile.typing_memo import remembered_typing
 
 _CHECKED, _UNCOMPILED = (bool(getattr(config, name)) for name in ("BOUNDSCHECK", "DISABLE_JIT"))
 _CONSTANTS = int, float, complex, str, tuple
+
+# How code is made here, on which all of it depends too.
+_HOW = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py")))).digest()
 
 KERNELS: list[Kernel] = []  # all that are cached on disk, as their modules are imported
 _compiling: list[Kernel] = []  # those being compiled, each for the one before it
@@ -77,6 +82,7 @@ class Kernel(CPUDispatcher):  # type: ignore[no-any-unimported]
             machine_code_where_called(self.targetctx),
             remembered_typing(),
             quick_numba(),
+            arrays_at_once(),
         ):
             arguments, _ = normalize_signature(sig)
             if not callee and arguments in self.overloads and not _wrapped(self.overloads[arguments]):
@@ -222,8 +228,9 @@ class _Memory:
 
 
 def _within_reach(function: Callable[..., Any], own: Any) -> bytes:
-    """Return the stamp of a function's own file, and of all that its module had imported when it was compiled."""
-    seen = [repr(own)]
+    """Return the stamp of a function's own file, of all that its module had imported when it was compiled, and of how
+    code is made."""
+    seen = [repr(own), repr(_HOW)]
     for name, value in sorted(function.__globals__.items()):
         if name.startswith("__"):
             continue
