@@ -190,6 +190,8 @@ class MadeAgain:
         """Return the samples (antenna, chirp, sample) of what meets turning bodies under phase errors."""
         made = dataclasses.replace(self.ramps, oscillator=oscillator)
         parts = []
+        if len(self.keys) == 1:
+            parts.append(made.turning(self.keys[0], 0, self.ramps.radar.waveform.n_chirps - 1))
         for start, end in pairwise(self.keys):
             far = reach(end.chirp - start.chirp)
             a = made.turning(start, start.chirp, start.chirp + far)

@@ -5,8 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from raychan.run.rules import fine_rule
-from raychan.run.turning import check_often, fluctuating, middle_chirp, moves_as_one, needed
+from raychan.run.turning import (
+    carried_over,
+    check_often,
+    fluctuating,
+    middle_chirp,
+    moves_as_one,
+    needed,
+    unfollowed,
+)
 from raychan.world.errors import SceneError
 from raychan.world.scene import Scene
 from raychan.world.scene_files.schema import PREVIEW
@@ -24,6 +35,8 @@ class Instant:
     """Whether the frame takes several tracings, of which this is the one of the middle."""
     notes: tuple[str, ...] = ()
     """What a user should know of it."""
+    carried: NDArray[np.bool_] | None = None
+    """Which bodies (b,) are carried on from its one tracing, where some are."""
 
 
 def traced_at(scene: Scene, model: Any) -> Instant:
@@ -35,8 +48,12 @@ def traced_at(scene: Scene, model: Any) -> Instant:
     often = model.mode != PREVIEW and needed(scene, model.retrace, edge)
     if often:
         check_often(scene, model.retrace)
-    # Between two tracings routes are carried on from the start of a ramp.
-    time = wave.start_of(middle_chirp(wave.n_chirps)) if often else wave.centre
+    once = not often and model.mode != PREVIEW
+    carried = carried_over(scene, model.retrace) if once else None
+    if carried is not None and not carried.any():
+        carried = None
+    # Routes are carried on from the start of a ramp.
+    time = wave.start_of(middle_chirp(wave.n_chirps)) if often or carried is not None else wave.centre
     if time <= 0.0 or (moves_as_one(scene) and not scene.interferers):
         return Instant(scene, scene, 0.0, often)
     try:
@@ -48,7 +65,10 @@ def traced_at(scene: Scene, model: Any) -> Instant:
         return Instant(scene, scene, 0.0, often, (late,))
     # The same scene stands alike at each run of it.
     then._derived = scene._derived.setdefault(("at", time), {})
-    return Instant(scene, then, time, often, _uneven(scene) if often else ())
+    notes = _uneven(scene) if often else ()
+    if once and model.retrace != 1:
+        notes = unfollowed(scene, np.zeros(len(scene.bodies), bool) if carried is None else carried)
+    return Instant(scene, then, time, often, notes, carried)
 
 
 def _uneven(scene: Scene) -> tuple[str, ...]:

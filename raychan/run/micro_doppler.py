@@ -59,6 +59,25 @@ def retraced(
     return work.even(last, first, int(model.retrace))
 
 
+def carried_over(
+    scene: Scene,
+    rule: PruneRule,
+    model: Any,
+    traced: Traced,
+    turns: NDArray[np.bool_],
+    progress: Callable[[float], None] | None = None,
+) -> Retraced:
+    """Return the samples of a frame that was traced once, at its middle, in which bodies pass so fast that constant
+    rates do not hold: what meets these is carried on to both ends of the frame.
+
+    Args: as of `retraced`; traced, the paths of its middle; turns, which bodies are carried on.
+    """
+    work = _Frame(scene, rule, model, progress)
+    work.turns = work.carried.turns = turns
+    work.most = 1
+    return work.once(traced)
+
+
 def stretches(
     scene: Scene, rule: PruneRule, model: Any, count: int, progress: Callable[[float], None] | None = None
 ) -> Iterator[tuple[Samples, Samples]]:
@@ -130,6 +149,12 @@ class _Frame:
         keyframes = [self.keyframe(int(c), first if count % 2 and c == middle else None) for c in np.unique(at)]
         return self.done([self.segment(a, b) for a, b in pairwise(keyframes)])
 
+    def once(self, traced: Traced) -> Retraced:
+        """Return the frame from the tracing of its middle alone."""
+        key = self.keyframe(middle_chirp(self.chirps), traced)
+        samples = self.carried.both(key, 0, self.chirps - 1).astype(complex)
+        return self.made(samples, np.zeros_like(samples), (key,))
+
     def segment(self, start: Keyframe, end: Keyframe) -> Segment:
         """Return the segment between two keyframes."""
         far = reach(end.chirp - start.chirp)
@@ -139,9 +164,12 @@ class _Frame:
     def done(self, segments: list[Segment]) -> Retraced:
         """Return the frame of segments in order."""
         samples, error = joined([s.blend() for s in segments]), joined([s.error() for s in segments])
+        return self.made(samples, error, (segments[0].start, *(s.end for s in segments)))
+
+    def made(self, samples: Samples, error: Samples, keys: tuple[Keyframe, ...]) -> Retraced:
+        """Return the frame of samples (2, antenna, chirp, sample) and their error, from keyframes."""
         if not self.radar.waveform.complex_sampling:
             samples, error = samples.real.astype(complex), error.real.astype(complex)
-        keys = segments[0].start, *(s.end for s in segments)
         return Retraced(
             samples=samples.sum(axis=0),
             turning=samples[0],

@@ -17,7 +17,7 @@ from raychan.run.instant import Instant, traced_at
 from raychan.run.ledger_entry import ModelChoice
 from raychan.run.mechanisms import choose
 from raychan.run.messages.launches import merged, uncut
-from raychan.run.micro_doppler import retraced
+from raychan.run.micro_doppler import carried_over, retraced
 from raychan.run.path_stream import MOST, Launched, PathStream
 from raychan.run.preview.frame import preview_notes, preview_of
 from raychan.run.refinement.scene_refinement import SceneRefinement
@@ -53,7 +53,7 @@ class Channel:
     stats: dict[str, Any]
     warnings: tuple[str, ...] = ()
     turned: Retraced | None = None
-    """Samples of a frame that was traced more than once."""
+    """Samples of a frame of which something is carried on, from one tracing or several."""
     remains: Remains | None = None
     """How its refinement ended."""
 
@@ -85,7 +85,7 @@ def channel_of(scene: Scene, tolerance_db: float | None, max_bounces: int | None
         return Channel(geometry, points, launched, launched, model, None, cost, (*said, *preview_notes()))
     channel = None
     if not traced.often:
-        channel = _refined(scene, geometry, points, model, clock)
+        channel = _refined(traced, geometry, points, model, clock)
         if channel is None:
             said.append(_WHOLE)
     if channel is None:
@@ -93,10 +93,11 @@ def channel_of(scene: Scene, tolerance_db: float | None, max_bounces: int | None
     return replace(channel, warnings=(*said, *channel.warnings))
 
 
-def _refined(scene: Scene, geometry: Geometry, points: Points, model: Any, clock: Clock) -> Channel | None:
+def _refined(traced: Instant, geometry: Geometry, points: Points, model: Any, clock: Clock) -> Channel | None:
     """Return the channel of a scene refined where detections need it; None where it has too many paths to be held."""
-    stats, radar = Stats(), scene.radar
-    refinement = SceneRefinement(geometry, points, radar, scene.processing, model, clock.tell, stats, begun=clock.begun)
+    stats, radar, settings = Stats(), traced.scene.radar, traced.scene.processing
+    routes: list[list[Batch]] | None = None if traced.carried is None else []
+    refinement = SceneRefinement(geometry, points, radar, settings, model, clock.tell, stats, routes, begun=clock.begun)
     with clock.stage("trace"):
         first = refinement.first()
         if first is None:
@@ -106,7 +107,14 @@ def _refined(scene: Scene, geometry: Geometry, points: Points, model: Any, clock
     launched, others, said, remains = found.launched, found.others, uncut(geometry, stats), found.remains
     if refinement.coarser:
         said = (*said, _coarser(model, 2**refinement.coarser))
-    return Channel(geometry, points, launched, others, found.model, found.chosen, cost, said, remains=remains)
+    turned = None
+    if traced.carried is not None and routes is not None:
+        with clock.stage("retrace"):
+            known = Traced(launched.paths, tuple(batch for launch in routes for batch in launch))
+            rule = fine_rule(radar, settings, found.model)
+            tell = partial(clock.tell, "retrace")
+            turned = carried_over(traced.start, rule, found.model, known, traced.carried, tell)
+    return Channel(geometry, points, launched, others, found.model, found.chosen, cost, said, turned, remains)
 
 
 def _launched_twice(traced: Instant, geometry: Geometry, points: Points, model: Any, clock: Clock) -> Channel:

@@ -38,7 +38,7 @@ class UnderPhaseErrors(Protocol):
 
 @dataclass(frozen=True)
 class Retraced:
-    """Noise-free samples of a frame with turning bodies, from several tracings."""
+    """Noise-free samples of a frame whose bodies turn, from several tracings, or pass fast, from one."""
 
     samples: Samples
     """(antenna, chirp, sample) [sqrt(W)]."""
@@ -57,6 +57,11 @@ class Retraced:
     """What makes the turning part again under phase errors, where the radar has any."""
     tracings: tuple[tuple[Paths, float], ...] = ()
     """Paths of each tracing, and how long [s] after the instant to which their delays refer it was made."""
+
+    @property
+    def once(self) -> bool:
+        """Whether the frame was traced once, so that no other tracing tells its error."""
+        return len(self.times) == 1
 
     @property
     def cube(self) -> Cube:

@@ -128,9 +128,8 @@ def _remaining(channel: Channel, found: ExplainedDetections, radar: Radar) -> li
     size = wave.range_resolution, wave.rate_resolution
     if channel.remains is None:
         return []
-    also = [
-        what for what, held in (("merged facets", channel.geometry.merged), ("turning bodies", channel.turned)) if held
-    ]
+    carried = "bodies that are carried on over the frame"
+    also = [what for what, held in (("merged facets", channel.geometry.merged), (carried, channel.turned)) if held]
     return channel.remains.notes((found.range, found.rate), size, found.error_db, also)
 
 
@@ -172,7 +171,7 @@ def _explained(
     """Return where each detection came from, and the ledger of what the run left out."""
     radar, settings, turned = scene.radar, scene.processing, channel.turned
     rdmap, found, error = detected
-    paths, model = channel.launched.paths, channel.model
+    paths, model, carried = channel.launched.paths, channel.model, turned.turns if turned else None
     weakest = float(found.power.min(initial=np.inf)) if len(found.power) else 0.0
 
     def explained() -> tuple[Explanation, ...]:
@@ -182,10 +181,11 @@ def _explained(
         return all_named(explained(), found, no_echo), preview_ledger(channel.geometry, radar, model)
     reasons, left_out = run_pair(
         explained,
-        lambda: ledger(paths, channel.geometry, channel.points, radar, settings, model, weakest, scene.bodies),
+        lambda: ledger(paths, channel.geometry, channel.points, radar, settings, model, weakest, scene.bodies, carried),
     )
     if turned:
-        left_out["intra-frame motion"] = motion(turned)
+        if not turned.once:
+            left_out["intra-frame motion"] = motion(turned)
         left_out[WIDE] = before_wide_arrays(paths, turned.turns, radar, settings, weakest)
         reasons = claimed(reasons, paths, turned, detected, receiver, radar, settings)
     return all_named(reasons, found, no_echo), left_out

@@ -15,6 +15,9 @@ _NEEDED = 1.0  # rad: phase error of constant rates over a frame above which `au
 _PASSING = 1e-3
 """rad: phase error of constant rates between tracings above which bodies that pass are carried on. Where those of two
 tracings meet, 0.05 rad made echoes that are none 70 dB below a plate's, 0.2 rad 40 dB, 0.5 rad 35 dB below."""
+_SMEARED = 0.15
+"""rad: phase error of constant rates over a frame from which on its one tracing is carried on for what passes. Of a
+point it takes 0.009 dB away without a window, 0.002 dB with Hann's."""
 _FARTHEST = 0.375  # of a frame of three tracings: how far one is carried on at most (see segments.reach)
 _SLOWEST = 1e-9  # rad/s: a limb may stand still for a moment
 
@@ -45,6 +48,31 @@ def passing(scene: Scene) -> NDArray[np.bool_]:
     where those of another take over: by the centripetal acceleration of their points. Targets that fluctuate are left
     to constant rates, and so are mirrors, which slide in their own plane."""
     return np.array([_passes(scene, body) and not body.fluctuates for body in scene.bodies], bool)
+
+
+def smeared(scene: Scene) -> NDArray[np.bool_]:
+    """Return which bodies (b,) pass the radar so fast that constant rates do not hold over a whole frame."""
+    return np.array([_phase_error(scene, body, 0.5) > _SMEARED for body in scene.bodies], bool)
+
+
+def carried_over(scene: Scene, retrace: str | int) -> NDArray[np.bool_]:
+    """Return which bodies (b,) are carried on over a whole frame from its one tracing."""
+    passes = smeared(scene) & ~np.array([body.fluctuates for body in scene.bodies], bool)
+    return passes if retrace == "auto" and scene.radar.waveform.n_chirps > 2 and not _refused(scene) else passes & False
+
+
+def unfollowed(scene: Scene, carried: NDArray[np.bool_]) -> tuple[str, ...]:
+    """Return a line if bodies pass so fast that constant rates do not hold over a frame, but are not carried on."""
+    left = smeared(scene) & ~carried
+    if not left.any():
+        return ()
+    names = ", ".join(body.name for body, one in zip(scene.bodies, left, strict=True) if one)
+    phase = max(_phase_error(scene, body, 0.5) for body, one in zip(scene.bodies, left, strict=True) if one)
+    why = _refused(scene)[:1] or ["a target that fluctuates"]
+    return (
+        f"{names}: passing bends ranges by up to {phase:.2g} rad of phase within the frame, and with {why[0]} rates "
+        "are constant: levels may be off by more than is stated",
+    )
 
 
 def fluctuating(scene: Scene) -> tuple[str, ...]:

@@ -40,18 +40,20 @@ def ledger(
     model: Any,
     weakest: float,
     bodies: Collection[Body] = (),
+    carried: NDArray[np.bool_] | None = None,
 ) -> dict[str, Entry]:
     """Return the unmodelled effects by name, each against the weakest detection's power [W]; where nothing was detected
     (0), further bounces against that of the weakest detection possible, and the others as unknown.
 
-    Args: settings, the scene's processing; model, what was modelled; bodies of the scene.
+    Args: settings, the scene's processing; model, what was modelled; bodies of the scene; which of them (b,) are
+    carried on over the frame.
     """
     if not weakest > 0.0 or not len(geometry.facets.vertices):
         why = "the scene has no bodies" if weakest > 0.0 else "nothing was detected"
         found = {name: Entry(UNKNOWN, "none", why) for name in _NAMES}
         if weakest > 0.0:
             # A receiver elsewhere hears the transmitter all the same.
-            found["intra-frame motion"] = intra_frame(paths, geometry.facets, radar)
+            found["intra-frame motion"] = intra_frame(paths, geometry.facets, radar, carried)
         if len(geometry.facets.vertices):
             # A corner whose last bounce is left out may be all that a scene has.
             least = least_detection(radar, settings)
@@ -66,7 +68,7 @@ def ledger(
         "creeping waves": lambda: creeping_waves(paths, geometry, points, radar, settings, weakest),
         "change over the band": lambda: over_band(paths, geometry, radar, settings, weakest),
         "tessellation": lambda: _tessellation(paths, geometry, bodies, radar, settings, weakest),
-        "intra-frame motion": lambda: intra_frame(paths, geometry.facets, radar),
+        "intra-frame motion": lambda: intra_frame(paths, geometry.facets, radar, carried),
         "diffraction": lambda: _diffraction(geometry, radar, weakest),
         "further mirrors": lambda: _mirrors(geometry, radar, model),
         "range migration": lambda: Entry(NOTHING, "exact", "kept in the cube to better than -100 dB of its peak"),

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from raychan.radar.radar import Radar
 from raychan.records import MIRROR, NONE, REFLECT, TRANSMIT, Facets, Paths
+from raychan.run.explanation.rate_spread import meets
 from raychan.run.ledger_entry import NOTHING, Entry
 from raychan.run.mechanisms import slots_used
 from raychan.tracing.tubes import unit
@@ -21,11 +22,12 @@ _PASSED = NONE, REFLECT, TRANSMIT  # what a line of sight meets
 _STRONG = 1e-3  # of the strongest echo's amplitude (not measured)
 
 
-def intra_frame(paths: Paths, facets: Facets, radar: Radar) -> Entry:
+def intra_frame(paths: Paths, facets: Facets, radar: Radar, carried: NDArray[np.bool_] | None = None) -> Entry:
     """Return the entry of changes within a frame: for crossing and turning bodies the phase deviates by at most
     k a T^2 / 4, a being the radial acceleration, of a radar with receivers elsewhere the mean of both ends', of a line
     of sight half the acceleration of its length; amplitudes fall as the length L of a path grows: those of its middle
-    differ from their mean by (L' T / L)^2 / 4, those of its start by L' T / L."""
+    differ from their mean by (L' T / L)^2 / 4, those of its start by L' T / L. Phases of what meets bodies (b,) that
+    are carried on are modelled."""
     frame = radar.waveform.frame_duration
     size = np.abs(paths.amplitude)
     # What the antenna does not hear at all (the ground right below a patch) is no path.
@@ -35,7 +37,8 @@ def intra_frame(paths: Paths, facets: Facets, radar: Radar) -> Entry:
     echo = np.asarray((~np.isin(paths.trajectories.kind, _PASSED)).any(axis=1))[paths.trajectory]
     strong = np.flatnonzero(size > _STRONG * (size[echo] if echo.any() else size).max())
     nearest = np.full(len(paths.trajectories.kind), np.inf)
-    np.minimum.at(nearest, paths.trajectory[strong], 0.5 * paths.length[strong])
+    bent = strong if carried is None else strong[~meets(paths, carried)[strong]]
+    np.minimum.at(nearest, paths.trajectory[bent], 0.5 * paths.length[bent])
     bend = _bend(paths, np.flatnonzero(np.isfinite(nearest)), nearest, facets, radar)
     phase = 2.0 * np.pi * radar.waveform.middle / C0 * bend * frame**2 / 4.0
     grown = float((np.abs(paths.length_rate[strong]) * frame / paths.length[strong]).max())

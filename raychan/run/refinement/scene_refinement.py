@@ -197,6 +197,8 @@ class SceneRefinement:
         quiet, off = synthesize(now, radar), synthesize(doubtful, radar, tolerance=_LEVEL)
         launched = Launched(now, len(now.length), radar, window, known=quiet)
         others = replace(launched, known=Cube(samples=quiet.samples - off.samples, noise_power=0.0))
+        if self._asked:  # who carries routes on tells the error of what they meet by paths
+            others = replace(others, paths=join([now, scaled(doubtful, -1.0)]))
         told = tuple(self._speckled), tuple(cells.settled), tuple(self._exceeded)
         remains = Remains(unreached, steps, ended, self.model.tolerance_db, *told)
         return Converged(launched, others, self.model, first.chosen, remains)
