@@ -50,7 +50,7 @@ class CarriedRamps:
         """Return the samples (2, antenna, chirp, sample) of a keyframe's paths extrapolated to chirps first to last: of
         those that meet turning bodies, and of all others."""
         out = self._nothing(2, first, last)
-        out[1] = self._others(key, first, last)
+        out[1] = self.others(key, first, last)
         self._carry(out[0], key, first)
         return out
 
@@ -64,7 +64,7 @@ class CarriedRamps:
         shape = halves, len(self.radar.elements), last - first + 1, self.radar.waveform.n_samples
         return np.zeros(shape, np.complex64)
 
-    def _others(self, key: Keyframe, first: int, last: int) -> Samples:
+    def others(self, key: Keyframe, first: int, last: int) -> Samples:
         """Return the samples (antenna, chirp, sample) of paths that meet no turning body, at chirps first to last."""
         wave = self.radar.waveform
         delay_rate = key.others.length_rate / C0 * (first - key.since) * wave.repetition
@@ -86,7 +86,7 @@ class CarriedRamps:
                 # One instant more than chirps: the rate is the change from chirp to chirp.
                 at = np.arange(start, start + count + 1, dtype=float)
                 lengths, amplitudes = carried_between(
-                    routes, strength, partial(self._poses, key), at, self.every, wave.middle
+                    routes, strength, partial(self.poses, key), at, self.every, wave.middle
                 )
                 # Phases are those of the carrier, from where the ramp begins.
                 amplitudes *= np.exp(2j * np.pi * wave.swept / C0 * lengths)
@@ -147,10 +147,7 @@ class CarriedRamps:
             waves, d, g = np.ascontiguousarray(strength), np.ascontiguousarray(delay), np.ascontiguousarray(delay_rate)
             step = wave.chirp_duration / wave.n_samples
             return np.asarray(ramp_sums(waves, d, g, wave.carrier, wave.slope, step, wave.n_samples))
-        here = np.zeros(3)
-        single: dict[str, Any] = {"elements": here[None], "tx_elements": here[None], "multiplexing": "none"}
-        single |= {"ddm_slots": None, "waveform": dataclasses.replace(wave, n_chirps=1, complex_sampling=True)}
-        one = dataclasses.replace(self.radar, **single, power=1.0)
+        one, here = alone(self.radar, wave, 1, wave.repetition), np.zeros(3)
         return np.stack(
             [
                 synthesize(echoes(*row, here), one).samples[0, 0]
@@ -158,7 +155,7 @@ class CarriedRamps:
             ]
         )
 
-    def _poses(self, key: Keyframe, chirps: Floats) -> Poses:
+    def poses(self, key: Keyframe, chirps: Floats) -> Poses:
         """Return the poses of bodies and radar at chirps, relative to a keyframe."""
         late = (chirps - key.chirp) * self.radar.waveform.repetition
         motions, radar = [b.motion for b in key.scene.bodies], key.scene.radar
@@ -172,6 +169,16 @@ class CarriedRamps:
             place=np.stack([m.poses(late)[1] for m in motions], axis=1),
             radar=radar.position + late[:, None] * radar.velocity,
         )
+
+
+def alone(radar: Radar, wave: Waveform, chirps: int, repetition: float) -> Radar:
+    """Return a radar of one element at its phase centre, with so many chirps of a waveform at equal distances [s]."""
+    wave, here = (
+        dataclasses.replace(wave, n_chirps=chirps, repetition=repetition, complex_sampling=True),
+        np.zeros((1, 3)),
+    )
+    single: dict[str, Any] = {"elements": here, "tx_elements": here, "multiplexing": "none", "ddm_slots": None}
+    return dataclasses.replace(radar, **single, waveform=wave, power=1.0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,6 +22,7 @@ from raychan.radar.radar import Radar
 from raychan.records import DIFFRACT, Paths, Routes
 from raychan.run.carried_ramps import CarriedRamps, MadeAgain
 from raychan.run.segments import Keyframe, PartFronts, Retraced, Segment, Traced, joined, reach
+from raychan.run.smooth_ramps import smooth_turning
 from raychan.run.solver import Batch, solve_into
 from raychan.run.turning import carried_on, middle_chirp
 from raychan.tracing.settings import PruneRule
@@ -152,7 +153,8 @@ class _Frame:
     def once(self, traced: Traced) -> Retraced:
         """Return the frame from the tracing of its middle alone."""
         key = self.keyframe(middle_chirp(self.chirps), traced)
-        samples = self.carried.both(key, 0, self.chirps - 1).astype(complex)
+        others = self.carried.others(key, 0, self.chirps - 1)
+        samples = np.stack([smooth_turning(self.carried, key), others])
         return self.made(samples, np.zeros_like(samples), (key,))
 
     def segment(self, start: Keyframe, end: Keyframe) -> Segment:

@@ -104,6 +104,10 @@ class PartFronts:
         parts = (3 * rows[:, None] + np.arange(3)).ravel()
         return PartFronts(whole, whole[np.repeat(np.arange(n), 3)].moved(parts, places))
 
+    def of_routes(self, rows: NDArray[np.int64]) -> PartFronts:
+        """Return the waves of some routes (r,)."""
+        return PartFronts(self.whole[rows], self.corners[(3 * rows[:, None] + np.arange(3)).ravel()])
+
     def between(self, tx: Floats, rx: Floats, split: NDArray[np.bool_]) -> tuple[Floats, Floats]:
         """Return how much longer (n, 3) [m] the parts are between elements at tx and rx (3,) [m] off the phase centres,
         and by which factor (n, 3) stronger, of routes of which some (n,) are `split` into their corners."""

@@ -1,0 +1,167 @@
+"""What one tracing's routes bring over a whole frame, from few instants of it: as their bodies move evenly, what turns
+them against paths of constant rates is smooth in slow time.
+
+Each part of a route is a path of constant rate times a factor, a sum of Chebyshev's polynomials of slow time, so that
+the samples are a few sums over such paths, each times its polynomial, in place of one sum a chirp. Parts whose factor
+is not such a sum are carried on chirp by chirp.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.polynomial.chebyshev import chebder, chebval
+from numpy.typing import NDArray
+
+from raychan.channel.slow_time import extrapolated
+from raychan.columns import take
+from raychan.radar.array import Transmission
+from raychan.radar.radar import Radar
+from raychan.records import Routes
+from raychan.run.carried_ramps import CarriedRamps, alone
+from raychan.run.segments import Keyframe, PartFronts, echoes
+from raychan.signal.baseband import synthesize
+from raychan.units import C0
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+Samples = NDArray[np.complexfloating[Any, Any]]
+
+_DEGREES = 8, 16, 32  # of the polynomials, tried in order
+_TAIL = 1e-5  # of a part's amplitude, in its last two polynomials: then it is a sum of these
+_LEAST = 1e-7  # of the root of all parts' power: what counts of a polynomial
+_SUM = 1e-6  # error of the sums, of all amplitudes (that of `synthesize`)
+_GAIN = 2  # chirps for each polynomial from which on sums over polynomials take less time than sums over chirps
+
+
+def smooth_turning(ramps: CarriedRamps, key: Keyframe) -> Samples:
+    """Return the samples (antenna, chirp, sample) of a frame's one tracing: of routes that meet bodies carried on."""
+    wave = ramps.radar.waveform
+    out = np.zeros((len(ramps.radar.elements), wave.n_chirps, wave.n_samples), np.complex128)
+    for routes, strength, fronts in zip(key.routes, key.strengths, key.fronts, strict=True):
+        left = np.arange(len(routes.kind))
+        for degree in (d for d in _DEGREES if d * _GAIN < wave.n_chirps):
+            some: Routes = take(routes, left)
+            parts = _Parts.of(some, strength[left], ramps, key, degree)
+            fits = parts.fit()
+            parts.add(out, ramps, fronts.of_routes(left), fits)
+            left = left[~fits]
+            if not len(left):
+                break
+        if len(left):
+            rest = dataclasses.replace(
+                key, routes=(take(routes, left),), strengths=(strength[left],), fronts=(fronts.of_routes(left),)
+            )
+            out += ramps.turning(rest, 0, wave.n_chirps - 1)[0]
+    return out
+
+
+@dataclasses.dataclass
+class _Parts:
+    """Parts (n, 3) of routes as paths of constant rate: lengths [m] at the frame's first chirp and their growth [m] in
+    a chirp, with factors (degree + 1, n, 3) of Chebyshev's polynomials of slow time, and those of these factors times
+    how much longer [m] the parts are."""
+
+    length: Floats
+    growth: Floats
+    factors: Complexes
+    longer: Complexes
+    traced: int
+    """The chirp of the tracing, from which on lengths drift apart between elements."""
+
+    @staticmethod
+    def of(routes: Routes, strength: Complexes, ramps: CarriedRamps, key: Keyframe, degree: int) -> _Parts:
+        """Return the parts of routes by their lengths and amplitudes at the extrema of the last polynomial."""
+        wave = ramps.radar.waveform
+        last, middle = wave.n_chirps - 1, 0.5 * (1.0 - 1.0 / wave.n_samples) * wave.chirp_duration / wave.repetition
+        to_factors = _to_polynomials(degree)
+        at = middle + 0.5 * last * (1.0 - np.cos(np.pi * np.arange(degree + 1) / degree))
+        lengths, amplitudes = extrapolated(routes, strength, ramps.poses(key, at), wave.middle)
+        ramps.least, ramps.most = min(ramps.least, lengths.min() / C0), max(ramps.most, lengths.max() / C0)
+        growth = (lengths[-1] - lengths[0]) / last
+        length = lengths[0] - middle * growth
+        k = 2.0 * np.pi * wave.middle / C0
+        for now, amplitude, away in zip(at, amplitudes, lengths, strict=True):
+            even = length + now * growth
+            amplitude *= np.exp(1j * k * even)
+            away -= even
+        # Within a ramp what lies off the even length moves an echo along range by itself, and by its rate.
+        faster = np.tensordot(_slopes(degree) @ to_factors * (2.0 / last / wave.repetition), lengths, 1)
+        lengths += wave.middle * wave.chirp_duration / wave.bandwidth * faster
+        factors, longer = (np.tensordot(to_factors, x, 1) for x in (amplitudes, amplitudes * lengths))
+        return _Parts(length, growth, factors, longer, key.chirp)
+
+    @cached_property
+    def size(self) -> Floats:
+        """The greatest factor (n, 3) of each part."""
+        return np.asarray(np.abs(self.factors).max(axis=0))
+
+    @property
+    def least(self) -> float:
+        """The least factor that counts."""
+        return _LEAST * float(np.linalg.norm(self.size))
+
+    def fit(self) -> NDArray[np.bool_]:
+        """Return which routes (n,) are sums of the polynomials."""
+        tail = np.abs(self.factors[-2:]).max(axis=0)
+        return np.asarray((tail <= np.maximum(_TAIL * self.size, self.least)).all(axis=1))
+
+    def add(self, out: Complexes, ramps: CarriedRamps, fronts: PartFronts, fits: NDArray[np.bool_]) -> None:
+        """Add what some routes (n,) bring to samples (antenna, chirp, sample)."""
+        rows = fits[:, None] & (self.factors != 0.0).any(axis=0)
+        if not rows.any():
+            return
+        split = np.asarray((self.factors[:, :, 1:] != 0.0).any(axis=(0, 2)))
+        for sent in ramps.radar.transmissions:
+            for layer, element in zip(out, ramps.radar.elements_world, strict=True):
+                longer, factor = fronts.between(sent.offset, element, split)
+                faster = fronts.faster(sent.offset, element, split) if fronts.drifting else np.zeros(longer.shape)
+                layer[sent.first :: sent.step] += self._sums(ramps.radar, sent, rows, longer, factor, faster)
+
+    def _sums(
+        self, radar: Radar, sent: Transmission, rows: NDArray[np.bool_], longer: Floats, factor: Floats, faster: Floats
+    ) -> Complexes:
+        """Return the samples (chirp, sample) of what one transmitter brings to one receiver over some parts (n, 3)."""
+        wave = radar.waveform
+        chirps = np.arange(sent.first, wave.n_chirps, sent.step)
+        growth = self.growth[rows] + wave.repetition * faster[rows]
+        first = self.length[rows] + longer[rows] + sent.first * growth
+        first -= self.traced * wave.repetition * faster[rows]
+        turn = np.sqrt(radar.power) * factor[rows] * np.exp(-2j * np.pi * wave.carrier / C0 * first)
+        one = alone(radar, wave, len(chirps), sent.step * wave.repetition)
+        # Of what the sweep turns beyond its middle the first order counts: it moves an echo along range.
+        swept = 2.0 * np.pi / C0 * wave.bandwidth
+        along = -1j * swept * ((np.arange(wave.n_samples) + 0.5) / wave.n_samples - 0.5)
+        total = self.size[rows].sum()
+        found = np.zeros((len(chirps), wave.n_samples), np.complex128)
+        here, angle = np.zeros(3), np.arccos(2.0 * chirps / (wave.n_chirps - 1) - 1.0)
+        for factors, across, weight in ((self.factors, 1.0, 1.0), (self.longer, along, 0.5 * swept)):
+            for j, each in enumerate(factors[:, rows]):
+                counts = np.flatnonzero(weight * np.abs(each) > self.least)
+                if not len(counts):
+                    continue
+                brought = (each * turn)[counts]
+                paths = echoes(first[counts], brought, growth[counts] / (C0 * wave.repetition), here)
+                rough = min(1e-2, max(_SUM, _SUM * total / (weight * np.abs(each[counts]).sum())))
+                samples = synthesize(paths, one, tolerance=rough).samples[0]
+                found += np.cos(j * angle)[:, None] * across * samples
+        return found * np.exp(2j * np.pi * (sent.turn * chirps % 1.0))[:, None]
+
+
+def _slopes(degree: int) -> Floats:
+    """Return the matrix (degree + 1, degree + 1) from factors of polynomials to the slopes of their sum at the extrema
+    of the last one, the least place first."""
+    at = -np.cos(np.pi * np.arange(degree + 1) / degree)
+    return np.stack([chebval(at, chebder(one)) for one in np.eye(degree + 1)], axis=1)
+
+
+def _to_polynomials(degree: int) -> Floats:
+    """Return the matrix (degree + 1, degree + 1) from values at the extrema of the last of Chebyshev's polynomials,
+    the least place first, to the factors of all (Trefethen 2013, Approximation Theory and Practice, ch. 3)."""
+    j, half = np.arange(degree + 1), np.where(np.isin(np.arange(degree + 1), (0, degree)), 0.5, 1.0)
+    # The least place is that of angle pi.
+    table: Floats = np.cos(np.pi * np.outer(j, degree - j) / degree) * half * half[:, None] * 2.0 / degree
+    return table
