@@ -3,7 +3,7 @@
 A footprint moves with its body; the lengths through its corners and the phase integral over it are computed again for
 each instant. Over plane mirrors a length is that to the image points of both ends in the planes as they then lie: exact
 for any turn as long as the same surfaces are met and seen. A curved mirror is replaced by its tangent plane at the
-vertex. Obliquity and spreading keep their values at the time of tracing.
+vertex. Waves spread as their ways to and from the scatterer grow; obliquity keeps its value at the time of tracing.
 """
 
 from __future__ import annotations
@@ -39,8 +39,10 @@ class Poses:
     """Rotations (t, b, 3, 3) since then."""
     place: Floats
     """Body origins (t, b, 3) [m]."""
-    radar: Floats
-    """Radar positions (t, 3) [m]."""
+    tx: Floats
+    """Where the waves start (t, 3) [m]."""
+    rx: Floats
+    """Where they end (t, 3) [m]."""
 
 
 _SOON = 1e-4  # s: interval of the difference quotient that gives a rate; its error is far below a rate cell
@@ -60,15 +62,15 @@ def corner_rates(
         origin=facets.origin,
         turn=np.array([[_turned(s) for s in t * facets.spin] for t in late]).reshape(2, -1, 3, 3),
         place=facets.origin + late * facets.velocity,
-        radar=routes.tx + late[:, 0] * np.asarray(tx_velocity, float),
+        tx=routes.tx + late[:, 0] * np.asarray(tx_velocity, float),
+        rx=routes.rx + late[:, 0] * np.asarray(rx_velocity, float),
     )
-    receiver = routes.rx + late[:, 0] * np.asarray(rx_velocity, float)
     out = np.empty((len(rows), 3))
 
     def some(at: slice) -> None:
         _corner_rates(
             rows[at], routes.vertices, routes.normals, routes.kind, routes.body, routes.scatter, routes.points,
-            poses.origin, poses.turn, poses.place, poses.radar, receiver, out[at],
+            poses.origin, poses.turn, poses.place, poses.tx, poses.rx, out[at],
         )  # fmt: skip
 
     parallel_for(len(rows), some)
@@ -100,16 +102,16 @@ def extrapolated(routes: Routes, strength: Complexes, poses: Poses, frequency: f
     amplitude 0. A route's parts are the same at all instants, so that its lengths have no jumps: these would be rates.
     Args: strength (n, 3) from `strengths`; poses of bodies and radar at the instants; frequency [Hz].
     """
-    shape = (len(poses.radar), len(routes.kind), 3)
+    shape = (len(poses.tx), len(routes.kind), 3)
     lengths, amplitudes = np.empty(shape), np.empty(shape, np.complex128)
     columns = (
         routes.vertices, routes.normals, routes.kind, routes.body, routes.scatter, routes.points, routes.lengths,
         routes.length, routes.taper, strength,
     )  # fmt: skip
-    when = poses.origin, poses.turn, poses.place, poses.radar, 2.0 * np.pi * frequency / C0
+    when = poses.origin, poses.turn, poses.place, poses.tx, poses.rx, 2.0 * np.pi * frequency / C0
 
     def some(rows: slice) -> None:
-        _carry(*(routes.tx, *(c[rows] for c in columns), *when, lengths[:, rows], amplitudes[:, rows]))
+        _carry(*(routes.tx, routes.rx, *(c[rows] for c in columns), *when, lengths[:, rows], amplitudes[:, rows]))
 
     parallel_for(shape[1], some)
     return lengths, amplitudes
@@ -135,7 +137,8 @@ def _turned_by(x, t, b, turn):  # type: ignore[no-untyped-def]
 @njit(cache=True, forceinline=True, uncounted=True)
 def _part_lengths(vertices, normals, kind, body, points, i, at, used, t, origin, turn, place, tx, rx, out):  # type: ignore[no-untyped-def]
     """Write the lengths (p + 1,) [m] at instant t of route i, which has `used` slots, through the first p points of its
-    footprint in slot `at`, and through its vertex there."""
+    footprint in slot `at`, and through its vertex there; return over what its wave spreads: the product of the ways to
+    that vertex and from it [m^2], without a vertex the length [m]."""
     forth, back = row(tx, t), row(rx, t)
     last = len(out) - 1
     for j in range(at):
@@ -145,19 +148,21 @@ def _part_lengths(vertices, normals, kind, body, points, i, at, used, t, origin,
     if at == used:
         for c in range(len(out)):
             out[c] = distance(forth, back)
-        return
+        return out[last]
     for j in range(used - 1, at, -1):
         if kind[i, j] == REFLECT:
             n = _turned_by(slot(normals, i, j), t, body[i, j], turn)
             back = mirrored(back, _moved(slot(vertices, i, j), body[i, j], t, origin, turn, place), n)
     b = body[i, at]
     centre = _moved(slot(vertices, i, at), b, t, origin, turn, place)
-    out[last] = distance(forth, centre) + distance(back, centre)
+    there, again = distance(forth, centre), distance(back, centre)
+    out[last] = there + again
     for c in range(last):
         out[c] = out[last]
         if kind[i, at] == SCATTER:
             p = _moved(slot(points, i, c), b, t, origin, turn, place)
             out[c] = distance(forth, p) + distance(back, p)
+    return there * again
 
 
 @njit(cache=True, nogil=True)
@@ -199,32 +204,32 @@ are as far from their sums over points with the centre as without (within 0.1 dB
 
 @njit(cache=True, nogil=True)
 def _carry(  # type: ignore[no-untyped-def]
-    tx, vertices, normals, kind, body, scatter, points, lengths, length, taper, strength, origin, turn, place, radar,
-    k, out_lengths, out,
+    tx, rx, vertices, normals, kind, body, scatter, points, lengths, length, taper, strength, origin, turn, place, txs,
+    rxs, k, out_lengths, out,
 ):  # fmt: skip
     n, d = kind.shape
     still = np.zeros((1, origin.shape[0], 3, 3))
     for b in range(origin.shape[0]):
         still[0, b, 0, 0] = still[0, b, 1, 1] = still[0, b, 2, 2] = 1.0
-    here, end = origin.reshape((1, *origin.shape)), tx.reshape((1, 3))
+    here, end, ending = origin.reshape((1, *origin.shape)), tx.reshape((1, 3)), rx.reshape((1, 3))
     now, then, phases, terms = np.empty(7), np.empty(7), np.empty(6), np.empty(3, np.complex128)
-    centres = np.empty(radar.shape[0])
+    centres = np.empty((2, txs.shape[0]))
     for i in range(n):
         used = 0
         while used < d and kind[i, used] > 0:
             used += 1
         at = scatter[i] if scatter[i] >= 0 else used
-        _part_lengths(
-            vertices, normals, kind, body, points, i, at, used, 0, origin, still, here, end, end, then
+        spread = _part_lengths(
+            vertices, normals, kind, body, points, i, at, used, 0, origin, still, here, end, ending, then
         )  # fmt: skip
         wide = at < used and kind[i, at] == SCATTER
         split = False
-        for t in range(radar.shape[0]):
-            _part_lengths(
-                vertices, normals, kind, body, points, i, at, used, t, origin, turn, place, radar, radar, now
+        for t in range(txs.shape[0]):
+            over = _part_lengths(
+                vertices, normals, kind, body, points, i, at, used, t, origin, turn, place, txs, rxs, now
             )  # fmt: skip
             centre = length[i] + now[6] - then[6]
-            centres[t] = centre
+            centres[0, t], centres[1, t] = centre, spread / over
             if not wide:
                 continue
             low, high = centre, centre
@@ -237,14 +242,14 @@ def _carry(  # type: ignore[no-untyped-def]
             split = split or high - low > APART
             triangle_terms(phases, _LINEAR, terms)
             for c in range(3):
-                out[t, i, c] = 3.0 * strength[i, c] * taper[i, c] * terms[c]
+                out[t, i, c] = 3.0 * centres[1, t] * strength[i, c] * taper[i, c] * terms[c]
         if split:
             continue
-        for t in range(radar.shape[0]):
+        for t in range(txs.shape[0]):
             if wide:
                 whole = out[t, i, 0] + out[t, i, 1] + out[t, i, 2]
             else:
-                whole = strength[i, 0] * np.exp(-1j * k * centres[t])
-            out_lengths[t, i, :] = centres[t]
+                whole = centres[1, t] * strength[i, 0] * np.exp(-1j * k * centres[0, t])
+            out_lengths[t, i, :] = centres[0, t]
             out[t, i, :] = 0.0
             out[t, i, 0] = whole

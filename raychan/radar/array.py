@@ -147,6 +147,10 @@ class Transmission:
         """Return the same with chirps counted from another number on, but for the phase."""
         return Transmission(self.offset, (self.first - chirp) % self.step, self.step, self.turn)
 
+    def code(self, chirps: NDArray[Any]) -> NDArray[np.complex128]:
+        """Return the phasors (n,) of chirps (n,) by their numbers."""
+        return np.asarray(np.exp(2j * np.pi * (self.turn * chirps % 1.0)))
+
 
 def reach(radar: Any) -> tuple[float, float]:
     """Return how far [m] the transmitters and the receivers of a radar stand off its phase centres, at most."""

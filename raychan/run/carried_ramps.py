@@ -6,7 +6,7 @@ import dataclasses
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +15,9 @@ from raychan.channel.slow_time import Poses
 from raychan.radar.array import Transmission
 from raychan.radar.radar import Radar
 from raychan.radar.waveform import Waveform
+from raychan.records import Routes
 from raychan.run.between_chirps import carried_between
-from raychan.run.segments import Keyframe, PartFronts, Segment, echoes, joined, reach
+from raychan.run.segments import Keyframe, Segment, echoes, joined, reach
 from raychan.signal.baseband import synthesize
 from raychan.signal.dechirp import ramp_sums
 from raychan.signal.phase_error import Delays, Oscillator
@@ -29,6 +30,13 @@ Samples = NDArray[np.complexfloating[Any, Any]]
 # Trade time against memory; single values not measured.
 _AT_ONCE = 64  # chirps whose routes are held in memory at once
 _FEW = 3_000_000  # samples times parts of routes up to which the plain sum is faster than a transform
+
+
+class Pair(NamedTuple):
+    """A transmitter and a receiver, (3,) [m] off the radar's place in world axes."""
+
+    sent: Transmission
+    element: Floats
 
 
 @dataclass
@@ -79,61 +87,49 @@ class CarriedRamps:
 
     def _carry(self, out: Samples, key: Keyframe, first: int) -> None:
         """Add to samples (antenna, chirp, sample) from a chirp on what routes bring that meet turning bodies."""
-        wave, last = self.radar.waveform, first + out.shape[1] - 1
-        for routes, strength, fronts in zip(key.routes, key.strengths, key.fronts, strict=True):
-            for start in range(first, last + 1, _AT_ONCE):
-                count = min(_AT_ONCE, last + 1 - start)
-                # One instant more than chirps: the rate is the change from chirp to chirp.
-                at = np.arange(start, start + count + 1, dtype=float)
-                lengths, amplitudes = carried_between(
-                    routes, strength, partial(self.poses, key), at, self.every, wave.middle
-                )
-                # Phases are those of the carrier, from where the ramp begins.
-                amplitudes *= np.exp(2j * np.pi * wave.swept / C0 * lengths)
-                rows = out[:, start - first : start - first + count]
-                for sent in self.radar.transmissions:
-                    self._add(rows, (start, at - key.chirp), sent, lengths, amplitudes, fronts)
+        for routes, strength in zip(key.routes, key.strengths, strict=True):
+            for sent in self.radar.transmissions:
+                for layer, element in zip(out, self.radar.elements_world, strict=True):
+                    rows = layer[sent.since(first).first :: sent.step]
+                    rows += self.between(Pair(sent, element), routes, strength, key, first, len(rows))
 
-    def _add(
-        self,
-        out: Samples,
-        begin: tuple[int, Floats],
-        sent: Transmission,
-        lengths: Floats,
-        amplitudes: Complexes,
-        fronts: PartFronts,
-    ) -> None:
-        """Add to samples (antenna, chirp, sample) what one transmitter brings over parts (chirp + 1, n, 3) of routes of
-        these lengths [m]. Args: begin, the number of the first chirp, and by how many chirps all come after the
-        keyframe (chirp + 1,)."""
-        (start, after), wave = begin, self.radar.waveform
-        chirps, late = slice(sent.since(start).first, None, sent.step), wave.repetition * after[:, None, None]
-        code = np.exp(2j * np.pi * (sent.turn * (start + np.arange(out.shape[1])[chirps]) % 1.0))[:, None]
-        split = np.asarray((amplitudes[:, :, 1:] != 0.0).any(axis=(0, 2)))
-        for layer, element in zip(out, self.radar.elements_world, strict=True):
-            longer, factor = fronts.between(sent.offset, element, split)
-            if fronts.drifting:
-                longer = longer + late * fronts.faster(sent.offset, element, split)
-            turn = np.sqrt(self.radar.power) * factor * np.exp(-2j * np.pi / wave.wavelength * longer)
-            brought = self._ramps(lengths + longer, amplitudes * turn, start, chirps)
-            layer[chirps] += brought if sent.turn == 0.0 else brought * code
+    def between(
+        self, pair: Pair, routes: Routes, strength: Complexes, key: Keyframe, first: int, count: int
+    ) -> Samples:
+        """Return the samples (chirp, sample) of what routes of a keyframe bring from a transmitter to a receiver, in so
+        many of its chirps, the first of them from chirp `first` on."""
+        wave, sent = self.radar.waveform, pair.sent
+        out = np.zeros((count, wave.n_samples), np.complex128)
+        begin = first + sent.since(first).first
+        for start in range(0, count, _AT_ONCE):
+            # An instant more than chirps at both ends: rates are central differences.
+            chirps = begin + sent.step * np.arange(start - 1, min(start + _AT_ONCE, count) + 1, dtype=float)
+            lengths, amplitudes = carried_between(
+                routes, strength, partial(self.poses, key, pair), chirps, self.every, wave.middle
+            )
+            # Phases are those of the carrier, from where the ramp begins.
+            amplitudes *= np.sqrt(self.radar.power) * np.exp(2j * np.pi * wave.swept / C0 * lengths)
+            brought = self._ramps(lengths, amplitudes, chirps)
+            out[start : start + len(brought)] = brought * sent.code(chirps[1:-1])[:, None]
+        return out
 
-    def _ramps(self, lengths: Floats, amplitudes: Complexes, start: int, chirps: slice) -> Samples:
-        """Return the samples (chirp, sample) of some chirps, counted from number `start`, of parts (chirp + 1, n, 3) of
-        routes with these lengths [m]."""
-        wave, count = self.radar.waveform, len(lengths) - 1
+    def _ramps(self, lengths: Floats, amplitudes: Complexes, chirps: Floats) -> Samples:
+        """Return the samples (chirp, sample) of all chirps (chirp + 2,) but the first and the last one, of parts
+        (chirp + 2, n, 3) of routes with these lengths [m]."""
+        wave, count = self.radar.waveform, len(chirps) - 2
+        amplitudes = amplitudes[1:-1]
         parts = np.flatnonzero((amplitudes != 0.0).any(axis=0))
-        delay = lengths.reshape(count + 1, -1)[:, parts] / C0
-        delay_rate, delay = (np.diff(delay, axis=0) / wave.repetition)[chirps], delay[:-1][chirps]
-        strength = amplitudes.reshape(count + 1, -1)[:-1, parts][chirps]
+        delay = lengths.reshape(count + 2, -1)[:, parts] / C0
+        delay_rate = (delay[2:] - delay[:-2]) / ((chirps[2] - chirps[0]) * wave.repetition)
+        delay, strength = delay[1:-1], amplitudes.reshape(count, -1)[:, parts]
         if not delay.size:
             return np.zeros((len(delay), wave.n_samples), np.complex128)
         self.least, self.most = min(self.least, float(delay.min())), max(self.most, float(delay.max()))
         if (by := self.oscillator) is None:
             return self._sums(wave, strength, delay, delay_rate)
         strength = strength * np.exp(-2j * np.pi * by.off * delay)
-        rows = np.arange(start, start + count)[chirps]
-        some = slice(int(rows[0]), int(rows[-1]) + 1, chirps.step)
+        step = int(chirps[1] - chirps[0])
+        some = slice(int(chirps[1]), int(chirps[-2]) + 1, step)
         total = np.zeros((len(delay), wave.n_samples), np.complex128)
         for at, share in by.groups(delay):
             mine = share.any(axis=0)
@@ -155,19 +151,21 @@ class CarriedRamps:
             ]
         )
 
-    def poses(self, key: Keyframe, chirps: Floats) -> Poses:
-        """Return the poses of bodies and radar at chirps, relative to a keyframe."""
+    def poses(self, key: Keyframe, pair: Pair, chirps: Floats) -> Poses:
+        """Return the poses of bodies and of a pair of elements at chirps, relative to a keyframe."""
         late = (chirps - key.chirp) * self.radar.waveform.repetition
         motions, radar = [b.motion for b in key.scene.bodies], key.scene.radar
         turn = np.broadcast_to(np.eye(3), (len(late), len(motions), 3, 3)).copy()
         for b in np.flatnonzero(self.turns):
             turn[:, b] = motions[b].poses(late)[0] @ motions[b].rotation().T
         origin = np.array([m.origin() for m in motions])
+        there = radar.position + late[:, None] * radar.velocity
         return Poses(
             origin=origin,
             turn=turn,
             place=np.stack([m.poses(late)[1] for m in motions], axis=1),
-            radar=radar.position + late[:, None] * radar.velocity,
+            tx=there + pair.sent.offset,
+            rx=there + pair.element,
         )
 
 

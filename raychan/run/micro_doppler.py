@@ -21,7 +21,7 @@ from raychan.columns import take
 from raychan.radar.radar import Radar
 from raychan.records import DIFFRACT, Paths, Routes
 from raychan.run.carried_ramps import CarriedRamps, MadeAgain
-from raychan.run.segments import Keyframe, PartFronts, Retraced, Segment, Traced, joined, reach
+from raychan.run.segments import Keyframe, Retraced, Segment, Traced, joined, reach
 from raychan.run.smooth_ramps import smooth_turning
 from raychan.run.solver import Batch, solve_into
 from raychan.run.turning import carried_on, middle_chirp
@@ -208,7 +208,6 @@ class _Frame:
             now,
             routes,
             tuple(strengths(r, geometry.facets, now.radar, wave.middle) for r in routes),
-            tuple(PartFronts.of(r, geometry.facets, now.radar) for r in routes),
             take(known.paths, rest[known.paths.trajectory]),
             known.paths,
             since,

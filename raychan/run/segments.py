@@ -3,18 +3,13 @@ error."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.corner_places import corner_places
-from raychan.channel.corner_rays import departures
-from raychan.channel.drifts import drifts
-from raychan.radar.array import Wavefronts, wavefronts
-from raychan.radar.radar import Radar
-from raychan.records import SCATTER, Cube, DiffractedRoutes, Facets, Paths, Routes
+from raychan.records import Cube, DiffractedRoutes, Paths, Routes
 from raychan.signal.phase_error import Delays, Oscillator
 from raychan.units import C0
 from raychan.world.scene import Scene
@@ -83,64 +78,14 @@ class Traced:
 
 
 @dataclass(frozen=True)
-class PartFronts:
-    """The waves of routes at both ends: of each whole (n,), and of its corners (3 n,)."""
-
-    whole: Wavefronts
-    corners: Wavefronts
-
-    @staticmethod
-    def of(routes: Routes, facets: Facets, radar: Radar) -> PartFronts:
-        """Return the waves of routes at a radar; those without a footprint have the same at all corners."""
-        n = len(routes.kind)
-        ends = (np.broadcast_to(x, (n, 1, 3)) for x in (routes.tx, routes.rx))
-        stops = np.concatenate([next(ends), routes.vertices, next(ends)], axis=1)
-        drift = drifts(routes, facets, radar, radar.velocity, radar.rx_motion)
-        whole = wavefronts(stops, routes.scatter, *departures(routes), routes.length)
-        if drift.shape[1]:
-            whole = replace(whole, drift=drift, instant=np.zeros(n))
-        rows = np.flatnonzero((routes.kind == SCATTER).any(axis=1))
-        places = corner_places(routes, rows, facets)[0].reshape(-1, 2, 3).astype(float)
-        parts = (3 * rows[:, None] + np.arange(3)).ravel()
-        return PartFronts(whole, whole[np.repeat(np.arange(n), 3)].moved(parts, places))
-
-    def of_routes(self, rows: NDArray[np.int64]) -> PartFronts:
-        """Return the waves of some routes (r,)."""
-        return PartFronts(self.whole[rows], self.corners[(3 * rows[:, None] + np.arange(3)).ravel()])
-
-    def between(self, tx: Floats, rx: Floats, split: NDArray[np.bool_]) -> tuple[Floats, Floats]:
-        """Return how much longer (n, 3) [m] the parts are between elements at tx and rx (3,) [m] off the phase centres,
-        and by which factor (n, 3) stronger, of routes of which some (n,) are `split` into their corners."""
-        corners, whole = self.corners.between(tx, rx), self.whole.between(tx, rx)
-        longer, factor = (_parts(x, y, split) for x, y in zip(corners, whole, strict=True))
-        return longer, factor
-
-    @property
-    def drifting(self) -> bool:
-        """Whether rates differ from element to element."""
-        return self.whole.drift is not None
-
-    def faster(self, tx: Floats, rx: Floats, split: NDArray[np.bool_]) -> Floats:
-        """Return by how much faster (n, 3) [m/s] the parts grow between elements at tx and rx (3,) [m]; split as for
-        `between`."""
-        return _parts(self.corners.faster(tx, rx), self.whole.faster(tx, rx), split)
-
-
-def _parts(corners: Floats, whole: Floats, split: NDArray[np.bool_]) -> Floats:
-    """Return values (n, 3) of parts of routes: of corners (3 n,) of those that are split (n,), else of the whole."""
-    return np.where(split[:, None], corners.reshape(-1, 3), whole[:, None])
-
-
-@dataclass(frozen=True)
 class Keyframe:
-    """One tracing at a chirp: the routes that meet turning bodies, with their strengths and waves, the other paths, and
-    all paths."""
+    """One tracing at a chirp: the routes that meet turning bodies, with their strengths, the other paths, and all
+    paths."""
 
     chirp: int
     scene: Scene
     routes: tuple[Routes, ...]
     strengths: tuple[Complexes, ...]
-    fronts: tuple[PartFronts, ...]
     others: Paths
     paths: Paths
     since: int

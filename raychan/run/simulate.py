@@ -18,7 +18,6 @@ from raychan.run.explanation.labels import Chains, chains, provenance
 from raychan.run.explanation.no_echoes import NoEcho, all_named, no_echoes_of
 from raychan.run.explanation.rate_spread import claimed, launch_share, motion, without
 from raychan.run.interferers import Sent, interference, never_heard
-from raychan.run.ledger.wide_arrays import WIDE, before_wide_arrays
 from raychan.run.ledger_entry import Entry
 from raychan.run.messages.launches import overrun
 from raychan.run.messages.results import counts, told
@@ -186,7 +185,6 @@ def _explained(
     if turned:
         if not turned.once:
             left_out["intra-frame motion"] = motion(turned)
-        left_out[WIDE] = before_wide_arrays(paths, turned.turns, radar, settings, weakest)
         reasons = claimed(reasons, paths, turned, detected, receiver, radar, settings)
     return all_named(reasons, found, no_echo), left_out
 

@@ -21,8 +21,8 @@ from raychan.columns import take
 from raychan.radar.array import Transmission
 from raychan.radar.radar import Radar
 from raychan.records import Routes
-from raychan.run.carried_ramps import CarriedRamps, alone
-from raychan.run.segments import Keyframe, PartFronts, echoes
+from raychan.run.carried_ramps import CarriedRamps, Pair, alone
+from raychan.run.segments import Keyframe, echoes
 from raychan.signal.baseband import synthesize
 from raychan.units import C0
 
@@ -41,22 +41,27 @@ def smooth_turning(ramps: CarriedRamps, key: Keyframe) -> Samples:
     """Return the samples (antenna, chirp, sample) of a frame's one tracing: of routes that meet bodies carried on."""
     wave = ramps.radar.waveform
     out = np.zeros((len(ramps.radar.elements), wave.n_chirps, wave.n_samples), np.complex128)
-    for routes, strength, fronts in zip(key.routes, key.strengths, key.fronts, strict=True):
-        left = np.arange(len(routes.kind))
-        for degree in (d for d in _DEGREES if d * _GAIN < wave.n_chirps):
-            some: Routes = take(routes, left)
-            parts = _Parts.of(some, strength[left], ramps, key, degree)
-            fits = parts.fit()
-            parts.add(out, ramps, fronts.of_routes(left), fits)
-            left = left[~fits]
-            if not len(left):
-                break
-        if len(left):
-            rest = dataclasses.replace(
-                key, routes=(take(routes, left),), strengths=(strength[left],), fronts=(fronts.of_routes(left),)
-            )
-            out += ramps.turning(rest, 0, wave.n_chirps - 1)[0]
+    for routes, strength in zip(key.routes, key.strengths, strict=True):
+        for sent in ramps.radar.transmissions:
+            for layer, element in zip(out, ramps.radar.elements_world, strict=True):
+                rows = layer[sent.first :: sent.step]
+                rows += _between(ramps, Pair(sent, element), routes, strength, key, len(rows))
     return out
+
+
+def _between(
+    ramps: CarriedRamps, pair: Pair, routes: Routes, strength: Complexes, key: Keyframe, count: int
+) -> Complexes:
+    """Return the samples (chirp, sample) of what routes bring from a transmitter to a receiver in all its chirps."""
+    out = np.zeros((count, ramps.radar.waveform.n_samples), np.complex128)
+    for degree in (d for d in _DEGREES if d * _GAIN < count):
+        parts = _Parts.of(routes, strength, ramps, key, pair, degree)
+        fits = parts.fit()
+        out += parts.sums(ramps.radar, pair.sent, fits)
+        routes, strength = take(routes, ~fits), strength[~fits]
+        if not len(strength):
+            return out
+    return out + ramps.between(pair, routes, strength, key, 0, count)
 
 
 @dataclasses.dataclass
@@ -69,17 +74,15 @@ class _Parts:
     growth: Floats
     factors: Complexes
     longer: Complexes
-    traced: int
-    """The chirp of the tracing, from which on lengths drift apart between elements."""
 
     @staticmethod
-    def of(routes: Routes, strength: Complexes, ramps: CarriedRamps, key: Keyframe, degree: int) -> _Parts:
+    def of(routes: Routes, strength: Complexes, ramps: CarriedRamps, key: Keyframe, pair: Pair, degree: int) -> _Parts:
         """Return the parts of routes by their lengths and amplitudes at the extrema of the last polynomial."""
         wave = ramps.radar.waveform
         last, middle = wave.n_chirps - 1, 0.5 * (1.0 - 1.0 / wave.n_samples) * wave.chirp_duration / wave.repetition
         to_factors = _to_polynomials(degree)
         at = middle + 0.5 * last * (1.0 - np.cos(np.pi * np.arange(degree + 1) / degree))
-        lengths, amplitudes = extrapolated(routes, strength, ramps.poses(key, at), wave.middle)
+        lengths, amplitudes = extrapolated(routes, strength, ramps.poses(key, pair, at), wave.middle)
         ramps.least, ramps.most = min(ramps.least, lengths.min() / C0), max(ramps.most, lengths.max() / C0)
         growth = (lengths[-1] - lengths[0]) / last
         length = lengths[0] - middle * growth
@@ -92,7 +95,7 @@ class _Parts:
         faster = np.tensordot(_slopes(degree) @ to_factors * (2.0 / last / wave.repetition), lengths, 1)
         lengths += wave.middle * wave.chirp_duration / wave.bandwidth * faster
         factors, longer = (np.tensordot(to_factors, x, 1) for x in (amplitudes, amplitudes * lengths))
-        return _Parts(length, growth, factors, longer, key.chirp)
+        return _Parts(length, growth, factors, longer)
 
     @cached_property
     def size(self) -> Floats:
@@ -109,28 +112,13 @@ class _Parts:
         tail = np.abs(self.factors[-2:]).max(axis=0)
         return np.asarray((tail <= np.maximum(_TAIL * self.size, self.least)).all(axis=1))
 
-    def add(self, out: Complexes, ramps: CarriedRamps, fronts: PartFronts, fits: NDArray[np.bool_]) -> None:
-        """Add what some routes (n,) bring to samples (antenna, chirp, sample)."""
-        rows = fits[:, None] & (self.factors != 0.0).any(axis=0)
-        if not rows.any():
-            return
-        split = np.asarray((self.factors[:, :, 1:] != 0.0).any(axis=(0, 2)))
-        for sent in ramps.radar.transmissions:
-            for layer, element in zip(out, ramps.radar.elements_world, strict=True):
-                longer, factor = fronts.between(sent.offset, element, split)
-                faster = fronts.faster(sent.offset, element, split) if fronts.drifting else np.zeros(longer.shape)
-                layer[sent.first :: sent.step] += self._sums(ramps.radar, sent, rows, longer, factor, faster)
-
-    def _sums(
-        self, radar: Radar, sent: Transmission, rows: NDArray[np.bool_], longer: Floats, factor: Floats, faster: Floats
-    ) -> Complexes:
-        """Return the samples (chirp, sample) of what one transmitter brings to one receiver over some parts (n, 3)."""
-        wave = radar.waveform
+    def sums(self, radar: Radar, sent: Transmission, fits: NDArray[np.bool_]) -> Complexes:
+        """Return the samples (chirp, sample) of what some routes (n,) bring in a transmitter's chirps."""
+        wave, rows = radar.waveform, fits[:, None] & (self.size > 0.0)
         chirps = np.arange(sent.first, wave.n_chirps, sent.step)
-        growth = self.growth[rows] + wave.repetition * faster[rows]
-        first = self.length[rows] + longer[rows] + sent.first * growth
-        first -= self.traced * wave.repetition * faster[rows]
-        turn = np.sqrt(radar.power) * factor[rows] * np.exp(-2j * np.pi * wave.carrier / C0 * first)
+        growth = self.growth[rows]
+        first = self.length[rows] + sent.first * growth
+        turn = np.sqrt(radar.power) * np.exp(-2j * np.pi * wave.carrier / C0 * first)
         one = alone(radar, wave, len(chirps), sent.step * wave.repetition)
         # Of what the sweep turns beyond its middle the first order counts: it moves an echo along range.
         swept = 2.0 * np.pi / C0 * wave.bandwidth
@@ -148,7 +136,7 @@ class _Parts:
                 rough = min(1e-2, max(_SUM, _SUM * total / (weight * np.abs(each[counts]).sum())))
                 samples = synthesize(paths, one, tolerance=rough).samples[0]
                 found += np.cos(j * angle)[:, None] * across * samples
-        return found * np.exp(2j * np.pi * (sent.turn * chirps % 1.0))[:, None]
+        return found * sent.code(chirps)[:, None]
 
 
 def _slopes(degree: int) -> Floats:

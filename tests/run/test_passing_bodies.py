@@ -33,17 +33,18 @@ _TURNING = rc.Body(
 )
 
 
-def _points_of_the_plate() -> np.ndarray:
-    """Return the samples (chirp, sample) of currents on the plate, each of its points moved from sample to sample."""
+def _points_of_the_plate(receiver: float = 0.0) -> np.ndarray:
+    """Return the samples (chirp,) of currents on the plate, each of its points moved from chirp to chirp; receiver [m]
+    to the left of the transmitter."""
     y, z = ((np.arange(n) + 0.5) / n * size - 0.5 * size for n, size in zip((120, 96), _SIZE, strict=True))
     y, z = (a.ravel() for a in np.meshgrid(y, z))
     k, area = 2.0 * np.pi / _WAVE.wavelength, _SIZE[0] * _SIZE[1] / len(y)
     out = np.zeros((_WAVE.n_chirps, _WAVE.n_samples), complex)
     for chirp in range(_WAVE.n_chirps):
         at = _PLACE + _SPEED * _WAVE.repetition * chirp + np.stack([0.0 * y, y, z], axis=1) - [0.0, 0.0, 0.7]
-        distance = np.linalg.norm(at, axis=1)
-        shown = at[:, 0] / distance * area / distance**2
-        out[chirp, 0] = k * (shown * np.exp(-2j * k * distance)).sum()
+        distance, back = np.linalg.norm(at, axis=1), np.linalg.norm(at - [0.0, receiver, 0.0], axis=1)
+        shown = 0.5 * at[:, 0] * (1.0 / distance + 1.0 / back) * area / distance / back
+        out[chirp, 0] = k * (shown * np.exp(-1j * k * (distance + back))).sum()
     return out[:, 0]
 
 
@@ -56,6 +57,22 @@ def test_a_plate_that_passes_beside_a_turning_box_has_the_phases_and_levels_of_i
     seen = seen[:, bin_]
     share = np.vdot(asked, seen)
     assert abs(share) ** 2 / (np.vdot(asked, asked).real * np.vdot(seen, seen).real) == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize("others", [(), (_TURNING,)])
+def test_a_plate_that_passes_a_wide_array_has_the_levels_of_its_points_at_each_element(others):
+    """Footprints that acted from their corners alone were off by 1 to 4 dB before arrays of 0.1 and 0.2 m, of 0.02
+    stated."""
+    elements = np.array([0.0, 1.0, 0.0]) * np.array([-0.3, 0.0, 0.15, 0.3])[:, None]
+    scene = _scene(_plate(), *others, tolerance_db=0.5)
+    radar = dataclasses.replace(scene.radar, elements=elements)
+    seen = rc.simulate(rc.Scene([_plate(), *others], radar=radar, model=scene.model)).cube.samples
+    bin_ = int(np.argmax((np.abs(np.fft.fft(seen[1], axis=1)) ** 2).sum(axis=0)))
+    seen = np.fft.fft(seen, axis=2)[:, :, bin_]
+    asked = np.array([_points_of_the_plate(y) for y in elements[:, 1]])
+    scale = np.vdot(asked[1], seen[1]) / np.vdot(asked[1], asked[1])
+    for one, truth in zip(seen, asked, strict=True):
+        assert np.linalg.norm(np.abs(one) - np.abs(scale * truth)) < 0.03 * np.linalg.norm(scale * truth)
 
 
 def test_a_body_passes_that_is_near_and_crosses_fast():
