@@ -24,6 +24,11 @@ def drifts(routes: Routes, facets: Facets, radar: Any, tx_velocity: Floats, rx_v
     moving = (facets.velocity, facets.spin, tx_velocity, rx_velocity)
     if not any(reach(radar)) or not any(np.any(x) for x in moving):
         return np.zeros((len(routes.kind), 0, 3))
+    return source_velocities(routes, facets, tx_velocity, rx_velocity)
+
+
+def source_velocities(routes: Routes, facets: Facets, tx_velocity: Floats, rx_velocity: Floats) -> Floats:
+    """Return the velocities (n, 2, 3) [m/s] of the same, whatever stands where."""
     ends = routes.tx, routes.rx, np.asarray(tx_velocity, float), np.asarray(rx_velocity, float)
     out = np.zeros((len(routes.kind), 2, 3))
     _drifts(routes.vertices, routes.kind, routes.body, facets.velocity, facets.spin, facets.origin, *ends, out)

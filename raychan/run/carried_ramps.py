@@ -15,9 +15,8 @@ from raychan.channel.slow_time import Poses
 from raychan.radar.array import Transmission
 from raychan.radar.radar import Radar
 from raychan.radar.waveform import Waveform
-from raychan.records import Routes
 from raychan.run.between_chirps import carried_between
-from raychan.run.segments import Keyframe, Segment, echoes, joined, reach
+from raychan.run.segments import CarriedRoutes, Keyframe, Segment, echoes, joined, reach
 from raychan.signal.baseband import synthesize
 from raychan.signal.dechirp import ramp_sums
 from raychan.signal.phase_error import Delays, Oscillator
@@ -87,15 +86,13 @@ class CarriedRamps:
 
     def _carry(self, out: Samples, key: Keyframe, first: int) -> None:
         """Add to samples (antenna, chirp, sample) from a chirp on what routes bring that meet turning bodies."""
-        for routes, strength in zip(key.routes, key.strengths, strict=True):
+        for routes in key.routes:
             for sent in self.radar.transmissions:
                 for layer, element in zip(out, self.radar.elements_world, strict=True):
                     rows = layer[sent.since(first).first :: sent.step]
-                    rows += self.between(Pair(sent, element), routes, strength, key, first, len(rows))
+                    rows += self.between(Pair(sent, element), routes, key, first, len(rows))
 
-    def between(
-        self, pair: Pair, routes: Routes, strength: Complexes, key: Keyframe, first: int, count: int
-    ) -> Samples:
+    def between(self, pair: Pair, carried: CarriedRoutes, key: Keyframe, first: int, count: int) -> Samples:
         """Return the samples (chirp, sample) of what routes of a keyframe bring from a transmitter to a receiver, in so
         many of its chirps, the first of them from chirp `first` on."""
         wave, sent = self.radar.waveform, pair.sent
@@ -105,8 +102,9 @@ class CarriedRamps:
             # An instant more than chirps at both ends: rates are central differences.
             chirps = begin + sent.step * np.arange(start - 1, min(start + _AT_ONCE, count) + 1, dtype=float)
             lengths, amplitudes = carried_between(
-                routes, strength, partial(self.poses, key, pair), chirps, self.every, wave.middle
+                carried.routes, carried.strengths, partial(self.poses, key, pair), chirps, self.every, wave.middle
             )
+            carried.heard(amplitudes, key.scene.radar, (chirps - key.chirp) * wave.repetition)
             # Phases are those of the carrier, from where the ramp begins.
             amplitudes *= np.sqrt(self.radar.power) * np.exp(2j * np.pi * wave.swept / C0 * lengths)
             brought = self._ramps(lengths, amplitudes, chirps)

@@ -16,12 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.channel.paths import join
-from raychan.channel.slow_time import strengths
 from raychan.columns import take
 from raychan.radar.radar import Radar
 from raychan.records import DIFFRACT, Paths, Routes
 from raychan.run.carried_ramps import CarriedRamps, MadeAgain
-from raychan.run.segments import Keyframe, Retraced, Segment, Traced, joined, reach
+from raychan.run.segments import CarriedRoutes, Keyframe, Retraced, Segment, Traced, joined, reach
 from raychan.run.smooth_ramps import smooth_turning
 from raychan.run.solver import Batch, solve_into
 from raychan.run.turning import carried_on, middle_chirp
@@ -198,7 +197,7 @@ class _Frame:
             self.rays += stats.rays
             known, since = Traced(join(parts), tuple(found)), chirp
         turned = [take(r, self.touches(r.body, r.kind)) for r in known.routes if isinstance(r, Routes)]
-        routes = tuple(r for r in turned if len(r.kind))
+        routes = tuple(CarriedRoutes.of(r, geometry.facets, now.radar) for r in turned if len(r.kind))
         trajectories = known.paths.trajectories
         rest = ~self.touches(trajectories.body, trajectories.kind) | (trajectories.kind == DIFFRACT).any(axis=1)
         if self.progress:
@@ -207,7 +206,6 @@ class _Frame:
             chirp,
             now,
             routes,
-            tuple(strengths(r, geometry.facets, now.radar, wave.middle) for r in routes),
             take(known.paths, rest[known.paths.trajectory]),
             known.paths,
             since,

@@ -9,7 +9,12 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.records import Cube, DiffractedRoutes, Paths, Routes
+from raychan.channel.aims import Aims
+from raychan.channel.slow_time import strengths
+from raychan.columns import take
+from raychan.radar.antenna import IsotropicAntenna
+from raychan.radar.radar import Radar
+from raychan.records import Cube, DiffractedRoutes, Facets, Paths, Routes
 from raychan.signal.phase_error import Delays, Oscillator
 from raychan.units import C0
 from raychan.world.scene import Scene
@@ -78,14 +83,41 @@ class Traced:
 
 
 @dataclass(frozen=True)
+class CarriedRoutes:
+    """Routes that are carried on, with their `strengths` (n, 3), and where antennas see their waves, unless these are
+    alike in all directions."""
+
+    routes: Routes
+    strengths: Complexes
+    aims: Aims | None
+
+    @staticmethod
+    def of(routes: Routes, facets: Facets, radar: Radar) -> CarriedRoutes:
+        """Return routes at a radar."""
+        alike = all(isinstance(antenna, IsotropicAntenna) for antenna in (radar.tx, radar.rx))
+        aims = None if alike else Aims.of(routes, facets, radar)
+        return CarriedRoutes(routes, strengths(routes, facets, radar, radar.waveform.middle), aims)
+
+    def __len__(self) -> int:
+        return len(self.strengths)
+
+    def __getitem__(self, rows: NDArray[Any]) -> CarriedRoutes:
+        aims = None if self.aims is None else self.aims[rows]
+        return CarriedRoutes(take(self.routes, rows), self.strengths[rows], aims)
+
+    def heard(self, amplitudes: Complexes, radar: Radar, late: Floats) -> None:
+        """Put on amplitudes (t, n, 3) what the radar's antennas change until instants (t,) [s] after the tracing."""
+        if self.aims is not None:
+            amplitudes *= self.aims.gains(radar, late)[:, :, None]
+
+
+@dataclass(frozen=True)
 class Keyframe:
-    """One tracing at a chirp: the routes that meet turning bodies, with their strengths, the other paths, and all
-    paths."""
+    """One tracing at a chirp: the routes that meet turning bodies, the other paths, and all paths."""
 
     chirp: int
     scene: Scene
-    routes: tuple[Routes, ...]
-    strengths: tuple[Complexes, ...]
+    routes: tuple[CarriedRoutes, ...]
     others: Paths
     paths: Paths
     since: int

@@ -17,12 +17,10 @@ from numpy.polynomial.chebyshev import chebder, chebval
 from numpy.typing import NDArray
 
 from raychan.channel.slow_time import extrapolated
-from raychan.columns import take
 from raychan.radar.array import Transmission
 from raychan.radar.radar import Radar
-from raychan.records import Routes
 from raychan.run.carried_ramps import CarriedRamps, Pair, alone
-from raychan.run.segments import Keyframe, echoes
+from raychan.run.segments import CarriedRoutes, Keyframe, echoes
 from raychan.signal.baseband import synthesize
 from raychan.units import C0
 
@@ -41,27 +39,25 @@ def smooth_turning(ramps: CarriedRamps, key: Keyframe) -> Samples:
     """Return the samples (antenna, chirp, sample) of a frame's one tracing: of routes that meet bodies carried on."""
     wave = ramps.radar.waveform
     out = np.zeros((len(ramps.radar.elements), wave.n_chirps, wave.n_samples), np.complex128)
-    for routes, strength in zip(key.routes, key.strengths, strict=True):
+    for routes in key.routes:
         for sent in ramps.radar.transmissions:
             for layer, element in zip(out, ramps.radar.elements_world, strict=True):
                 rows = layer[sent.first :: sent.step]
-                rows += _between(ramps, Pair(sent, element), routes, strength, key, len(rows))
+                rows += _between(ramps, Pair(sent, element), routes, key, len(rows))
     return out
 
 
-def _between(
-    ramps: CarriedRamps, pair: Pair, routes: Routes, strength: Complexes, key: Keyframe, count: int
-) -> Complexes:
+def _between(ramps: CarriedRamps, pair: Pair, routes: CarriedRoutes, key: Keyframe, count: int) -> Complexes:
     """Return the samples (chirp, sample) of what routes bring from a transmitter to a receiver in all its chirps."""
     out = np.zeros((count, ramps.radar.waveform.n_samples), np.complex128)
     for degree in (d for d in _DEGREES if d * _GAIN < count):
-        parts = _Parts.of(routes, strength, ramps, key, pair, degree)
+        parts = _Parts.of(routes, ramps, key, pair, degree)
         fits = parts.fit()
         out += parts.sums(ramps.radar, pair.sent, fits)
-        routes, strength = take(routes, ~fits), strength[~fits]
-        if not len(strength):
+        routes = routes[~fits]
+        if not len(routes):
             return out
-    return out + ramps.between(pair, routes, strength, key, 0, count)
+    return out + ramps.between(pair, routes, key, 0, count)
 
 
 @dataclasses.dataclass
@@ -76,13 +72,15 @@ class _Parts:
     longer: Complexes
 
     @staticmethod
-    def of(routes: Routes, strength: Complexes, ramps: CarriedRamps, key: Keyframe, pair: Pair, degree: int) -> _Parts:
+    def of(carried: CarriedRoutes, ramps: CarriedRamps, key: Keyframe, pair: Pair, degree: int) -> _Parts:
         """Return the parts of routes by their lengths and amplitudes at the extrema of the last polynomial."""
         wave = ramps.radar.waveform
         last, middle = wave.n_chirps - 1, 0.5 * (1.0 - 1.0 / wave.n_samples) * wave.chirp_duration / wave.repetition
         to_factors = _to_polynomials(degree)
         at = middle + 0.5 * last * (1.0 - np.cos(np.pi * np.arange(degree + 1) / degree))
-        lengths, amplitudes = extrapolated(routes, strength, ramps.poses(key, pair, at), wave.middle)
+        poses = ramps.poses(key, pair, at)
+        lengths, amplitudes = extrapolated(carried.routes, carried.strengths, poses, wave.middle)
+        carried.heard(amplitudes, key.scene.radar, (at - key.chirp) * wave.repetition)
         ramps.least, ramps.most = min(ramps.least, lengths.min() / C0), max(ramps.most, lengths.max() / C0)
         growth = (lengths[-1] - lengths[0]) / last
         length = lengths[0] - middle * growth
