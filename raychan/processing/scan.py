@@ -25,16 +25,6 @@ _AWAY = (1.0, 2.0)
 _OFF, _OFF_CELLS = 0.02, 0.05  # of the distance, and range cells: by which a source may stand off it (not measured)
 _SAFETY = 4.0  # on the power of a bent or uneven wave that a plane one cannot fit (not measured)
 
-PLANE_FROM = 2.0
-"""Times 2 D^2 / wavelength: nearer, other methods than beams lose echoes. Of cells of 2 to 4 before sparse and free
-arrays music has 9 of 20 wrong without a word at 1.05 times it, 2 of 14 at 1.25, 1 of 14 at 1.6, none of 20 at 2."""
-
-
-def far_field(aperture: Aperture) -> float:
-    """Return 2 D^2 / wavelength [m] of an aperture."""
-    extent = np.ptp(aperture.elements, axis=0)
-    return 2.0 * float(extent @ extent) / aperture.wavelength
-
 
 @dataclass(frozen=True, eq=False)
 class Scan:
@@ -57,8 +47,8 @@ class Scan:
         Args: noise, share of the cell's power below which an echo is none: what curvature leaves far below it tells
         nothing.
 
-        Only beams fit spherical waves: where these matter they stand in for other methods."""
-        if not self.parts or distance <= 0.0 or (self.method != "bartlett" and distance >= self._far):
+        Only beams fit spherical waves: where these matter other methods seek plane waves beside them."""
+        if not self.parts or distance <= 0.0:
             return [self]
         least = max(_FLOOR, _TELLS * noise)
         if self._curved(distance) <= least:
@@ -66,12 +56,7 @@ class Scan:
         own, away, beyond = self.aperture, [x * distance for x in _AWAY], distance + self.beyond
         near = [NearAperture.of(own, self.parts, x) for x in away + [beyond] * bool(self._curved(beyond) > least)]
         beams = replace(self, method="bartlett", known=True)
-        return [replace(beams, aperture=x) for x in [*near, own]]
-
-    @property
-    def _far(self) -> float:
-        """From where on [m] other methods seek plane waves."""
-        return PLANE_FROM * far_field(self.aperture)
+        return [*(replace(beams, aperture=x) for x in near), replace(self, known=True)]
 
     def _curved(self, distance: Any) -> Any:
         """Return the share of echoes' power (n,), at distances (n,) [m], that is no plane wave as theirs is curved, an

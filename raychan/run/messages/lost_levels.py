@@ -8,10 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.processing.scan import PLANE_FROM, far_field
 from raychan.radar.radar import Radar
 from raychan.run.numbered import numbers, share_of, verb
-from raychan.run.receiver import aperture_of
 from raychan.run.receiver_losses import BeamLosses, beam_losses, beside, far_field_distance, migration
 from raychan.run.result import DC, ExplainedDetections, Explanation
 
@@ -55,19 +53,6 @@ def _hiding(found: ExplainedDetections, wave: Bools, beams: BeamLosses, radar: R
         f"{share_of(rows)} may hide echoes of {'its cell' if one else 'their cells'} over {least} dB weaker "
         f"({numbers(rows)}): {'its ranges differ' if one else 'their ranges differ'} over the elements by up to "
         f"{beams.range_cells[rows].max():.2f} cells"
-    ]
-
-
-def near_beams(found: ExplainedDetections, radar: Radar) -> list[str]:
-    """Return a line if detections show so near that beams of spherical waves stand in for another method."""
-    method, far = radar.processing.doa, PLANE_FROM * far_field(aperture_of(radar))
-    rows = np.asarray((found.range < far) & (np.isfinite(found.azimuth) | np.isfinite(found.elevation)))
-    if method == "bartlett" or not rows.any():
-        return []
-    return [
-        f"{share_of(rows)} {'shows' if rows.sum() == 1 else 'show'} nearer than 4 D^2 / wavelength = {far:.3g} m "
-        f"({numbers(rows)}), D the width of the array: {method} takes waves to be plane, so directions there are those "
-        "of bartlett"
     ]
 
 

@@ -13,7 +13,7 @@ from raychan.radar.radar import Radar
 from raychan.records import RangeDoppler
 from raychan.run.explanation.two_ways import apart
 from raychan.run.ledger_entry import SEEN, Entry
-from raychan.run.messages.lost_levels import lost, near_beams
+from raychan.run.messages.lost_levels import lost
 from raychan.run.numbered import numbers, share_of, verb
 from raychan.run.result import DC, IMAGE, INTERFERENCE, SIDELOBE, ExplainedDetections, Explanation, Result
 
@@ -197,7 +197,6 @@ def told(
         *two_ways(reasons, radar),
         *warned(found, tolerance_db, rdmap),
         *([] if radar is None else [*mirrored(found, rdmap, radar), *lost(found, reasons, radar)]),
-        *([] if radar is None else near_beams(found, radar)),
         *noted(found, tolerance_db, ledger),
     ]
 
