@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from raychan.run.explain import CellExplanation, CellPaths
 
+_MOVES = 0.1  # dB: sums that differ by more are not those of the same paths
 _COUNTS = 1e-3  # of the strongest contribution to the cell: weaker paths are not listed
 _OTHERS = 5  # most other detections that are named
 _Paths = Annotated[
@@ -165,4 +166,12 @@ def _sum(why: CellExplanation) -> str:
 
     error = f"stated error {why.error_db:.2f} dB" if why.converged else "not converged: error unknown"
     off = f", {why.reciprocity_db:.1f} dB off reciprocity" if why.reciprocity_db >= 0.1 else ""
-    return f"sum of the paths: {dbm(why.predicted):.1f} dBm, {error}{off}"
+    sums = dbm(why.predicted)
+    if why.paths is not None and (why.beam or why.antennas == 1):
+        constant = dbm(max(abs(why.paths.wave.sum()) ** 2, 1e-300))
+        if abs(constant - sums) > _MOVES:
+            return (
+                f"sum of the paths, as bodies turn or pass within the frame: {sums:.1f} dBm, {error}{off}; paths "
+                f"of its middle, of constant rates, add up to {constant:.1f} dBm"
+            )
+    return f"sum of the paths: {sums:.1f} dBm, {error}{off}"

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 import raychan as rc
+from raychan.cli import invoke
+from raychan.run.storage import write_result
 from raychan.run.turning import carried_on, passing
 from raychan.units import db
 
@@ -139,3 +141,12 @@ def test_beside_a_slow_turn_a_plate_that_passes_fast_has_its_level_at_any_tolera
     assert both.stats["tracings"] > 1
     one, other = (db(r.detections.power.max()) for r in (both, alone))
     assert one == pytest.approx(other, abs=0.1)
+
+
+def test_explain_says_that_the_paths_of_the_middle_do_not_add_up_to_the_level(tmp_path, capsys):
+    for speed, told in ((30.0, True), (0.0, False)):
+        out = tmp_path / f"{speed:g}"
+        out.mkdir()
+        write_result(rc.simulate(_scene(_plate(velocity=(0.0, speed, 0.0)))), out)
+        assert invoke(["explain", str(out), "--detection", "1"]) == 0
+        assert ("of its middle, of constant rates, add up to" in capsys.readouterr().out) == told
