@@ -57,7 +57,7 @@ class CarriedRamps:
         """Return the samples (2, antenna, chirp, sample) of a keyframe's paths extrapolated to chirps first to last: of
         those that meet turning bodies, and of all others."""
         out = self._nothing(2, first, last)
-        out[1] = self.others(key, first, last)
+        out[1] = self._others(key, first, last)
         self._carry(out[0], key, first)
         return out
 
@@ -71,7 +71,7 @@ class CarriedRamps:
         shape = halves, len(self.radar.elements), last - first + 1, self.radar.waveform.n_samples
         return np.zeros(shape, np.complex64)
 
-    def others(self, key: Keyframe, first: int, last: int) -> Samples:
+    def _others(self, key: Keyframe, first: int, last: int) -> Samples:
         """Return the samples (antenna, chirp, sample) of paths that meet no turning body, at chirps first to last."""
         wave = self.radar.waveform
         delay_rate = key.others.length_rate / C0 * (first - key.since) * wave.repetition

@@ -19,9 +19,9 @@ from raychan.channel.paths import join
 from raychan.columns import take
 from raychan.radar.radar import Radar
 from raychan.records import DIFFRACT, Paths, Routes
-from raychan.run.carried_ramps import CarriedRamps, MadeAgain
+from raychan.run.carried_ramps import MadeAgain
 from raychan.run.segments import CarriedRoutes, Keyframe, Retraced, Segment, Traced, joined, reach
-from raychan.run.smooth_ramps import smooth_turning
+from raychan.run.smooth_ramps import SmoothRamps
 from raychan.run.solver import Batch, solve_into
 from raychan.run.turning import carried_on, middle_chirp
 from raychan.tracing.settings import PruneRule
@@ -106,7 +106,7 @@ class _Frame:
         self.radar: Radar = dataclasses.replace(scene.radar, noise=False)
         wave = self.radar.waveform
         self.chirps, self.step = wave.n_chirps, wave.repetition
-        self.carried = CarriedRamps(self.radar, self.turns)
+        self.carried = SmoothRamps(self.radar, self.turns)
         self.rays, self.times = 0, list[float]()
         self.most = max(3, 1 + self.chirps // _CHIRPS)
         self.reached = True
@@ -152,8 +152,7 @@ class _Frame:
     def once(self, traced: Traced) -> Retraced:
         """Return the frame from the tracing of its middle alone."""
         key = self.keyframe(middle_chirp(self.chirps), traced)
-        others = self.carried.others(key, 0, self.chirps - 1)
-        samples = np.stack([smooth_turning(self.carried, key), others])
+        samples = self.carried.both(key, 0, self.chirps - 1).astype(complex)
         return self.made(samples, np.zeros_like(samples), (key,))
 
     def segment(self, start: Keyframe, end: Keyframe) -> Segment:

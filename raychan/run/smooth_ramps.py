@@ -1,5 +1,5 @@
-"""What one tracing's routes bring over a whole frame, from few instants of it: as their bodies move evenly, what turns
-them against paths of constant rates is smooth in slow time.
+"""What a tracing's routes bring over many ramps, from few instants: as bodies move on, what turns them against paths of
+constant rates is smooth in slow time.
 
 Each part of a route is a path of constant rate times a factor, a sum of Chebyshev's polynomials of slow time, so that
 the samples are a few sums over such paths, each times its polynomial, in place of one sum a chirp. Parts whose factor
@@ -26,6 +26,7 @@ from raychan.units import C0
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
+Ints = NDArray[np.int64]
 Samples = NDArray[np.complexfloating[Any, Any]]
 
 _DEGREES = 8, 16, 32  # of the polynomials, tried in order
@@ -35,36 +36,30 @@ _SUM = 1e-6  # error of the sums, of all amplitudes (that of `synthesize`)
 _GAIN = 2  # chirps for each polynomial from which on sums over polynomials take less time than sums over chirps
 
 
-def smooth_turning(ramps: CarriedRamps, key: Keyframe) -> Samples:
-    """Return the samples (antenna, chirp, sample) of a frame's one tracing: of routes that meet bodies carried on."""
-    wave = ramps.radar.waveform
-    out = np.zeros((len(ramps.radar.elements), wave.n_chirps, wave.n_samples), np.complex128)
-    for routes in key.routes:
-        for sent in ramps.radar.transmissions:
-            for layer, element in zip(out, ramps.radar.elements_world, strict=True):
-                rows = layer[sent.first :: sent.step]
-                rows += _between(ramps, Pair(sent, element), routes, key, len(rows))
-    return out
+class SmoothRamps(CarriedRamps):
+    """What a radar receives of keyframes' routes at other chirps, summed over polynomials where they are such sums."""
 
-
-def _between(ramps: CarriedRamps, pair: Pair, routes: CarriedRoutes, key: Keyframe, count: int) -> Complexes:
-    """Return the samples (chirp, sample) of what routes bring from a transmitter to a receiver in all its chirps."""
-    out = np.zeros((count, ramps.radar.waveform.n_samples), np.complex128)
-    for degree in (d for d in _DEGREES if d * _GAIN < count):
-        parts = _Parts.of(routes, ramps, key, pair, degree)
-        fits = parts.fit()
-        out += parts.sums(ramps.radar, pair.sent, fits)
-        routes = routes[~fits]
-        if not len(routes):
-            return out
-    return out + ramps.between(pair, routes, key, 0, count)
+    def between(self, pair: Pair, carried: CarriedRoutes, key: Keyframe, first: int, count: int) -> Samples:
+        """Return the samples (chirp, sample) of what routes of a keyframe bring from a transmitter to a receiver, in so
+        many of its chirps, the first of them from chirp `first` on."""
+        out = np.zeros((count, self.radar.waveform.n_samples), np.complex128)
+        if self.oscillator is None and self.every == 1.0:
+            chirps = first + pair.sent.since(first).first + pair.sent.step * np.arange(count)
+            for degree in (d for d in _DEGREES if d * _GAIN < count):
+                parts = _Parts.of(carried, self, key, pair, degree, chirps)
+                fits = parts.fit()
+                out += parts.sums(self.radar, pair.sent, fits, chirps)
+                carried = carried[~fits]
+                if not len(carried):
+                    return out
+        return out + super().between(pair, carried, key, first, count)
 
 
 @dataclasses.dataclass
 class _Parts:
-    """Parts (n, 3) of routes as paths of constant rate: lengths [m] at the frame's first chirp and their growth [m] in
-    a chirp, with factors (degree + 1, n, 3) of Chebyshev's polynomials of slow time, and those of these factors times
-    how much longer [m] the parts are."""
+    """Parts (n, 3) of routes as paths of constant rate: lengths [m] at the first of some chirps and their growth [m]
+    in a chirp of the frame, with factors (degree + 1, n, 3) of Chebyshev's polynomials of slow time, and those of these
+    factors times how much longer [m] the parts are."""
 
     length: Floats
     growth: Floats
@@ -72,15 +67,16 @@ class _Parts:
     longer: Complexes
 
     @staticmethod
-    def of(carried: CarriedRoutes, ramps: CarriedRamps, key: Keyframe, pair: Pair, degree: int) -> _Parts:
+    def of(carried: CarriedRoutes, ramps: CarriedRamps, key: Keyframe, pair: Pair, degree: int, chirps: Ints) -> _Parts:
         """Return the parts of routes by their lengths and amplitudes at the extrema of the last polynomial."""
         wave = ramps.radar.waveform
-        last, middle = wave.n_chirps - 1, 0.5 * (1.0 - 1.0 / wave.n_samples) * wave.chirp_duration / wave.repetition
+        last = chirps[-1] - chirps[0]
+        middle = 0.5 * (1.0 - 1.0 / wave.n_samples) * wave.chirp_duration / wave.repetition
         to_factors = _to_polynomials(degree)
         at = middle + 0.5 * last * (1.0 - np.cos(np.pi * np.arange(degree + 1) / degree))
-        poses = ramps.poses(key, pair, at)
+        poses = ramps.poses(key, pair, chirps[0] + at)
         lengths, amplitudes = extrapolated(carried.routes, carried.strengths, poses, wave.middle)
-        carried.heard(amplitudes, key.scene.radar, (at - key.chirp) * wave.repetition)
+        carried.heard(amplitudes, key.scene.radar, (chirps[0] + at - key.chirp) * wave.repetition)
         ramps.least, ramps.most = min(ramps.least, lengths.min() / C0), max(ramps.most, lengths.max() / C0)
         growth = (lengths[-1] - lengths[0]) / last
         length = lengths[0] - middle * growth
@@ -110,12 +106,10 @@ class _Parts:
         tail = np.abs(self.factors[-2:]).max(axis=0)
         return np.asarray((tail <= np.maximum(_TAIL * self.size, self.least)).all(axis=1))
 
-    def sums(self, radar: Radar, sent: Transmission, fits: NDArray[np.bool_]) -> Complexes:
-        """Return the samples (chirp, sample) of what some routes (n,) bring in a transmitter's chirps."""
+    def sums(self, radar: Radar, sent: Transmission, fits: NDArray[np.bool_], chirps: Ints) -> Complexes:
+        """Return the samples (chirp, sample) of what some routes (n,) bring in a transmitter's chirps (chirp,)."""
         wave, rows = radar.waveform, fits[:, None] & (self.size > 0.0)
-        chirps = np.arange(sent.first, wave.n_chirps, sent.step)
-        growth = self.growth[rows]
-        first = self.length[rows] + sent.first * growth
+        growth, first = self.growth[rows], self.length[rows]
         turn = np.sqrt(radar.power) * np.exp(-2j * np.pi * wave.carrier / C0 * first)
         one = alone(radar, wave, len(chirps), sent.step * wave.repetition)
         # Of what the sweep turns beyond its middle the first order counts: it moves an echo along range.
@@ -123,7 +117,7 @@ class _Parts:
         along = -1j * swept * ((np.arange(wave.n_samples) + 0.5) / wave.n_samples - 0.5)
         total = self.size[rows].sum()
         found = np.zeros((len(chirps), wave.n_samples), np.complex128)
-        here, angle = np.zeros(3), np.arccos(2.0 * chirps / (wave.n_chirps - 1) - 1.0)
+        here, angle = np.zeros(3), np.arccos(2.0 * (chirps - chirps[0]) / (chirps[-1] - chirps[0]) - 1.0)
         for factors, across, weight in ((self.factors, 1.0, 1.0), (self.longer, along, 0.5 * swept)):
             for j, each in enumerate(factors[:, rows]):
                 counts = np.flatnonzero(weight * np.abs(each) > self.least)

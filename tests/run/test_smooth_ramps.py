@@ -9,10 +9,11 @@ import pytest
 
 import raychan as rc
 from raychan.run import micro_doppler
+from raychan.run.carried_ramps import CarriedRamps
 from raychan.run.instant import traced_at
 from raychan.run.rules import fine_rule
 from raychan.run.segments import Traced
-from raychan.run.smooth_ramps import _slopes, _to_polynomials, smooth_turning
+from raychan.run.smooth_ramps import _slopes, _to_polynomials
 from raychan.run.solver import solve_into
 from raychan.run.turning import middle_chirp
 from raychan.world.geometry import geometry_of
@@ -48,8 +49,8 @@ def _scene(wave: rc.Waveform, speed: float, without: str, **radar: object) -> rc
         ({}, {"elements": _LINE}, "", -55.0),
     ],
 )
-@pytest.mark.parametrize("speed", [8.0, 15.0])
-def test_few_instants_bring_what_every_chirp_brings(wave, radar, without, limit, speed):
+@pytest.mark.parametrize(("speed", "first"), [(8.0, 0), (15.0, 0), (15.0, 5)])
+def test_few_instants_bring_what_every_chirp_brings(wave, radar, without, limit, speed, first):
     """The sum over chirps is the slow form: it takes the rate within a ramp from that ramp to the next. Before arrays
     it splits the plate into corners in parts of the frame, the quick form in all of it."""
     scene = _scene(dataclasses.replace(_WAVE, **wave), speed, without, **radar)
@@ -64,8 +65,8 @@ def test_few_instants_bring_what_every_chirp_brings(wave, radar, without, limit,
     frame = micro_doppler._Frame(scene, rule, scene.model, None)
     frame.turns = frame.carried.turns = traced.carried
     key = frame.keyframe(middle_chirp(frame.chirps), Traced(micro_doppler.join(paths), tuple(routes)))
-    slow = frame.carried.turning(key, 0, frame.chirps - 1)[0]
-    off = np.abs(smooth_turning(frame.carried, key) - slow) ** 2
+    slow = CarriedRamps(frame.radar, traced.carried).turning(key, first, frame.chirps - 1)[0]
+    off = np.abs(frame.carried.turning(key, first, frame.chirps - 1)[0] - slow) ** 2
     level = 10.0 * np.log10(off.sum() / (np.abs(slow) ** 2).sum())
     assert level < limit
 
