@@ -101,11 +101,12 @@ class CarriedRamps:
         for start in range(0, count, _AT_ONCE):
             # An instant more than chirps at both ends: rates are central differences.
             chirps = begin + sent.step * np.arange(start - 1, min(start + _AT_ONCE, count) + 1, dtype=float)
+            at = chirps + middle_of(wave)
             lengths, amplitudes = carried_between(
-                carried.routes, carried.strengths, partial(self.poses, key, pair), chirps, self.every, wave.middle
+                carried.routes, carried.strengths, partial(self.poses, key, pair), at, self.every, wave.middle
             )
-            carried.heard(amplitudes, key.scene.radar, (chirps - key.chirp) * wave.repetition)
-            # Phases are those of the carrier, from where the ramp begins.
+            carried.heard(amplitudes, key.scene.radar, (at - key.chirp) * wave.repetition)
+            # Phases are those of the carrier, of ramps at whose middle the parts are so long.
             amplitudes *= np.sqrt(self.radar.power) * np.exp(2j * np.pi * wave.swept / C0 * lengths)
             brought = self._ramps(lengths, amplitudes, chirps)
             out[start : start + len(brought)] = brought * sent.code(chirps[1:-1])[:, None]
@@ -113,13 +114,15 @@ class CarriedRamps:
 
     def _ramps(self, lengths: Floats, amplitudes: Complexes, chirps: Floats) -> Samples:
         """Return the samples (chirp, sample) of all chirps (chirp + 2,) but the first and the last one, of parts
-        (chirp + 2, n, 3) of routes with these lengths [m]."""
+        (chirp + 2, n, 3) of routes with these lengths [m] at the middle of ramps."""
         wave, count = self.radar.waveform, len(chirps) - 2
         amplitudes = amplitudes[1:-1]
         parts = np.flatnonzero((amplitudes != 0.0).any(axis=0))
         delay = lengths.reshape(count + 2, -1)[:, parts] / C0
         delay_rate = (delay[2:] - delay[:-2]) / ((chirps[2] - chirps[0]) * wave.repetition)
-        delay, strength = delay[1:-1], amplitudes.reshape(count, -1)[:, parts]
+        grown = middle_of(wave) * wave.repetition * delay_rate
+        delay = delay[1:-1] - grown
+        strength = amplitudes.reshape(count, -1)[:, parts] * np.exp(2j * np.pi * wave.carrier * grown)
         if not delay.size:
             return np.zeros((len(delay), wave.n_samples), np.complex128)
         self.least, self.most = min(self.least, float(delay.min())), max(self.most, float(delay.max()))
@@ -165,6 +168,11 @@ class CarriedRamps:
             tx=there + pair.sent.offset,
             rx=there + pair.element,
         )
+
+
+def middle_of(wave: Waveform) -> float:
+    """Return how far after its start the middle sample of a ramp is, in chirps."""
+    return wave.swept / wave.slope / wave.repetition
 
 
 def alone(radar: Radar, wave: Waveform, chirps: int, repetition: float) -> Radar:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from raychan.channel.slow_time import extrapolated
 from raychan.radar.array import Transmission
 from raychan.radar.radar import Radar
-from raychan.run.carried_ramps import CarriedRamps, Pair, alone
+from raychan.run.carried_ramps import CarriedRamps, Pair, alone, middle_of
 from raychan.run.segments import CarriedRoutes, Keyframe, echoes
 from raychan.signal.baseband import synthesize
 from raychan.units import C0
@@ -71,7 +71,7 @@ class _Parts:
         """Return the parts of routes by their lengths and amplitudes at the extrema of the last polynomial."""
         wave = ramps.radar.waveform
         last = chirps[-1] - chirps[0]
-        middle = 0.5 * (1.0 - 1.0 / wave.n_samples) * wave.chirp_duration / wave.repetition
+        middle = middle_of(wave)
         to_factors = _to_polynomials(degree)
         at = middle + 0.5 * last * (1.0 - np.cos(np.pi * np.arange(degree + 1) / degree))
         poses = ramps.poses(key, pair, chirps[0] + at)

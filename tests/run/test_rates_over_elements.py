@@ -17,7 +17,8 @@ def scene(rate: float, width: float = 0.24, **wave):
     target = {"name": "target", "shape": "sphere", "params": {"radius": 0.005}, "rcs_dbsm": 40.0}
     target |= {"position": [AHEAD, 0.0, 0.5], "velocity_mps": [0.0, rate, 0.0]}
     radar = {"position": [0.0, 0.0, 0.5], "elements_mm": [[1e3 * x for x in e] for e in line], "waveform": WAVE | wave}
-    return rc.Scene.from_dict({"radar": radar, "bodies": [target], "model": {"max_bounces": 1}})
+    # Constant rates over the frame: else the echo is smeared over rates besides.
+    return rc.Scene.from_dict({"radar": radar, "bodies": [target], "model": {"max_bounces": 1, "retrace": 1}})
 
 
 def lines(result) -> list[str]:

@@ -13,19 +13,23 @@ from raychan.radar.beam_table import beam_of
 from raychan.run.solver import solve
 from raychan.signal.baseband import synthesize
 from raychan.tracing.settings import PruneRule, refinement
+from raychan.units import C0
 
 
 def every_chirp(scene: rc.Scene) -> tuple[NDArray[np.complex64], PruneRule]:
-    """Return the samples, slow and obvious: the scene moved to each chirp, traced, and one ramp synthesised; and the
-    rule by which it was traced."""
+    """Return the samples, slow and obvious: the scene moved to the middle of each ramp, traced, and that ramp
+    synthesised, with constant rates within it; and the rule by which it was traced."""
     wave, radar = scene.radar.waveform, scene.radar
+    middle = wave.swept / wave.slope
     rule = refinement(wave.carrier, scene.model.tolerance_db, 0.0, scene.model.max_transmissions)
     rows = []
     for m in range(wave.n_chirps):
-        now = scene.at(m * wave.repetition)
+        now = scene.at(m * wave.repetition + middle)
         paths, _ = solve(now.facets(), now.points(), now.radar, wave.carrier, rule, scene.model.max_bounces)
         one = dataclasses.replace(now.radar, waveform=dataclasses.replace(wave, n_chirps=1), noise=False)
-        rows.append(synthesize(paths, one).samples)
+        grown = middle * paths.length_rate
+        turned = paths.amplitude * np.exp(2j * np.pi * wave.carrier / C0 * grown)
+        rows.append(synthesize(paths.replace(length=paths.length - grown, amplitude=turned), one).samples)
     return np.concatenate(rows, axis=1), PruneRule(radar.position, beam_of(radar), rule, scene.model.max_bounces)
 
 
