@@ -155,7 +155,7 @@ def test_the_phase_left_out_of_receivers_beside_the_transmitter_is_that_of_one_p
         point = rc.Body(
             "p", shape="sphere", params={"radius": 0.01}, position=(8, 0, 1), velocity=(0, 22, 0), rcs_dbsm=30
         )
-        result = rc.simulate(rc.Scene(bodies=[point], radar=radar, model={"max_bounces": 1}))
+        result = rc.simulate(rc.Scene(bodies=[point], radar=radar, model={"max_bounces": 1, "retrace": 1}))
         levels.append(result.ledger["intra-frame motion"].level_db)
         assert any("intra-frame motion" in line for line in result.warnings)
     assert levels[0] == pytest.approx(levels[1], abs=0.1)

@@ -90,13 +90,17 @@ def test_the_fast_sum_is_the_exact_one(radar, instant):
     assert np.abs(synthesize(still, given).samples - exact).max() > 0.01 * np.abs(exact).max()
 
 
-def test_a_crossing_target_has_at_each_element_the_rate_of_the_way_to_it():
+@pytest.mark.parametrize("retrace", [1, "auto"])
+def test_a_crossing_target_has_at_each_element_the_rate_of_the_way_to_it(retrace):
+    """Traced once with constant rates, else carried on."""
     sizes = {"repetition": 50e-6, "n_chirps": 256, "n_samples": 32}
     wave = rc.Waveform(carrier=77e9, bandwidth=300e6, chirp_duration=40e-6, **sizes)
     radar = rc.Radar(wave, position=(0.0, 0.0, 0.0), elements=LINE, noise=False)
     place, velocity = np.array([4.0, 1.0, 0.3]), np.array([3.0, -8.0, 1.0])
     ball = rc.Body(name="ball", shape="sphere", params={"radius": 0.005}, rcs_dbsm=0.0)
-    scene = rc.Scene(bodies=[replace(ball, position=tuple(place), velocity=tuple(velocity))], radar=radar)
+    scene = rc.Scene(
+        bodies=[replace(ball, position=tuple(place), velocity=tuple(velocity))], radar=radar, model={"retrace": retrace}
+    )
     result = rc.simulate(scene)
     then = place + velocity * result.traced_at
     begun, ramp = wave.repetition * np.arange(256)[:, None], wave.chirp_duration / 32 * np.arange(32)
@@ -104,13 +108,16 @@ def test_a_crossing_target_has_at_each_element_the_rate_of_the_way_to_it():
 
     def way(end):
         apart = then - end
+        if retrace == "auto":
+            return np.linalg.norm(apart + velocity * (time - result.traced_at)[..., None], axis=-1)
         far = np.linalg.norm(apart)
         return far + apart @ velocity / far * (time - result.traced_at)
 
     for samples, element in zip(result.cube.samples, radar.elements_world, strict=True):
-        delay = (way(np.zeros(3)) + way(element)) / C0
+        forth, back = way(np.zeros(3)), way(element)
+        delay = (forth + back) / C0
         turns = wave.carrier * delay + slope * ramp * delay - 0.5 * slope * delay**2
-        beat = np.exp(-2j * np.pi * turns)
+        beat = np.exp(-2j * np.pi * turns) / (forth * back if retrace == "auto" else 1.0)
         share = np.vdot(beat, samples) / np.sqrt(np.vdot(beat, beat).real * np.vdot(samples, samples).real)
         assert abs(share) > 1.0 - 1e-5
 
