@@ -24,6 +24,7 @@ from raychan.run.segments import CarriedRoutes, Keyframe, Retraced, Segment, Tra
 from raychan.run.smooth_ramps import SmoothRamps
 from raychan.run.solver import Batch, solve_into
 from raychan.run.turning import carried_on, middle_chirp
+from raychan.tracing.joined_routes import joined as joined_routes
 from raychan.tracing.settings import PruneRule
 from raychan.world.geometry import geometry_of, surface_at
 from raychan.world.scene import Scene
@@ -32,6 +33,7 @@ Samples = NDArray[np.complexfloating[Any, Any]]
 
 # Trade time against error; single values not measured.
 _CHIRPS = 48  # least chirps per keyframe: bounds the number of tracings
+_ROUTES = 20_000  # carried on at once: less memory against fewer sums
 _HELPS = 0.5  # of the error power before: a keyframe that leaves more is the last one in its segment
 _BETWEEN = 0.6e-3
 """From one computed pose to the next in a spectrogram [s]: a walker's samples are then off by -117 dB (0.3 ms:
@@ -196,7 +198,8 @@ class _Frame:
             self.rays += stats.rays
             known, since = Traced(join(parts), tuple(found)), chirp
         turned = [take(r, self.touches(r.body, r.kind)) for r in known.routes if isinstance(r, Routes)]
-        routes = tuple(CarriedRoutes.of(r, geometry.facets, now.radar) for r in turned if len(r.kind))
+        some = joined_routes([r for r in turned if len(r.kind)], _ROUTES)
+        routes = tuple(CarriedRoutes.of(r, geometry.facets, now.radar) for r in some)
         trajectories = known.paths.trajectories
         rest = ~self.touches(trajectories.body, trajectories.kind) | (trajectories.kind == DIFFRACT).any(axis=1)
         if self.progress:
