@@ -16,6 +16,7 @@ from raychan.run.turning import (
     middle_chirp,
     moves_as_one,
     needed,
+    smeared,
     unfollowed,
 )
 from raychan.world.errors import SceneError
@@ -67,7 +68,7 @@ def traced_at(scene: Scene, model: Any) -> Instant:
     then._derived = scene._derived.setdefault(("at", time), {})
     notes = _uneven(scene) if often else ()
     if once and model.retrace != 1:
-        notes = unfollowed(scene, np.zeros(len(scene.bodies), bool) if carried is None else carried)
+        notes = unfollowed(scene, smeared(scene) if carried is None else smeared(scene) & ~carried)
     return Instant(scene, then, time, often, notes, carried)
 
 

@@ -61,7 +61,7 @@ def retraced(
     return work.even(last, first, int(model.retrace))
 
 
-def carried_over(
+def carried_from_middle(
     scene: Scene,
     rule: PruneRule,
     model: Any,

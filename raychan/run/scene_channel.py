@@ -17,7 +17,7 @@ from raychan.run.instant import Instant, traced_at
 from raychan.run.ledger_entry import ModelChoice
 from raychan.run.mechanisms import choose
 from raychan.run.messages.launches import merged, uncut
-from raychan.run.micro_doppler import carried_over, retraced
+from raychan.run.micro_doppler import carried_from_middle, retraced
 from raychan.run.path_stream import MOST, Launched, PathStream
 from raychan.run.preview.frame import preview_notes, preview_of
 from raychan.run.refinement.scene_refinement import SceneRefinement
@@ -25,7 +25,7 @@ from raychan.run.refinement.unreached import Remains
 from raychan.run.rules import asked, check_demand, check_rule, fine_rule
 from raychan.run.segments import Retraced, Traced
 from raychan.run.solver import Batch, solve_into
-from raychan.run.turning import carried_on
+from raychan.run.turning import carried_on, unfollowed
 from raychan.tracing.settings import PruneRule
 from raychan.tracing.stats import Stats
 from raychan.world.geometry import Geometry, geometry_of
@@ -88,6 +88,8 @@ def channel_of(scene: Scene, tolerance_db: float | None, max_bounces: int | None
         channel = _refined(traced, geometry, points, model, clock)
         if channel is None:
             said.append(_WHOLE)
+            if traced.carried is not None:
+                said += unfollowed(scene, traced.carried, "so many paths")
     if channel is None:
         channel = _launched_twice(traced, geometry, points, model, clock)
     return replace(channel, warnings=(*said, *channel.warnings))
@@ -113,7 +115,7 @@ def _refined(traced: Instant, geometry: Geometry, points: Points, model: Any, cl
             known = Traced(launched.paths, tuple(batch for launch in routes for batch in launch))
             rule = fine_rule(radar, settings, found.model)
             tell = partial(clock.tell, "retrace")
-            turned = carried_over(traced.start, rule, found.model, known, traced.carried, tell)
+            turned = carried_from_middle(traced.start, rule, found.model, known, traced.carried, tell)
     return Channel(geometry, points, launched, others, found.model, found.chosen, cost, said, turned, remains)
 
 

@@ -61,17 +61,17 @@ def carried_over(scene: Scene, retrace: str | int) -> NDArray[np.bool_]:
     return passes if retrace == "auto" and scene.radar.waveform.n_chirps > 2 and not _refused(scene) else passes & False
 
 
-def unfollowed(scene: Scene, carried: NDArray[np.bool_]) -> tuple[str, ...]:
-    """Return a line if bodies pass so fast that constant rates do not hold over a frame, but are not carried on."""
-    left = smeared(scene) & ~carried
-    if not left.any():
+def unfollowed(scene: Scene, left: NDArray[np.bool_], why: str = "") -> tuple[str, ...]:
+    """Return a line if some bodies (b,) pass so fast that constant rates do not hold over a frame, but are not carried
+    on. Args: why they are not, unless what the scene has tells."""
+    passing_by = [body for body, one in zip(scene.bodies, left, strict=True) if one]
+    if not passing_by:
         return ()
-    names = ", ".join(body.name for body, one in zip(scene.bodies, left, strict=True) if one)
-    phase = max(_phase_error(scene, body, 0.5) for body, one in zip(scene.bodies, left, strict=True) if one)
-    why = _refused(scene)[:1] or ["a target that fluctuates"]
+    phase = max(_phase_error(scene, body, 0.5) for body in passing_by)
+    reason = why or (*_refused(scene), "targets that fluctuate")[0]
     return (
-        f"{names}: passing bends ranges by up to {phase:.2g} rad of phase within the frame, and with {why[0]} rates "
-        "are constant: levels may be off by more than is stated",
+        f"{', '.join(body.name for body in passing_by)}: passing bends ranges by up to {phase:.2g} rad of phase within "
+        f"the frame, and with {reason} rates are constant: levels may be off by more than is stated",
     )
 
 

@@ -132,6 +132,22 @@ def test_a_line_names_targets_that_fluctuate_while_they_pass_what_turns():
     assert not any("fluctuates and passes" in line for line in rc.simulate(_scene(target)).warnings)
 
 
+@pytest.mark.parametrize(
+    ("body", "radar", "why"),
+    [
+        ({"rcs_dbsm": 10.0, "swerling": 1}, {}, "targets that fluctuate"),
+        ({}, {"rx_position": (0.0, 0.02, 0.7)}, "receivers elsewhere"),
+        ({}, {"rx_polarization": "both"}, "receivers of both polarisations"),
+    ],
+)
+def test_a_line_names_what_passes_with_constant_rates(body, radar, why):
+    scene = _scene(_plate(**body))
+    given = rc.Scene(scene.bodies, radar=dataclasses.replace(scene.radar, **radar), model=scene.model)
+    told = [line for line in rc.simulate(given).warnings if "rates are constant" in line]
+    assert len(told) == 1 and told[0].startswith("plate: ") and why in told[0]
+    assert not any("rates are constant" in line for line in rc.simulate(_scene(_plate())).warnings)
+
+
 @pytest.mark.parametrize("tolerance", [0.5, 0.05])
 def test_beside_a_slow_turn_a_plate_that_passes_fast_has_its_level_at_any_tolerance(tolerance):
     """Traced once it was 1.1 dB too weak, of 0.05 dB stated at 0.1 dB."""

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raychan.radar.radar import Radar
-from raychan.records import MIRROR, NONE, REFLECT, TRANSMIT, Facets, Paths
+from raychan.records import DIFFRACT, MIRROR, NONE, REFLECT, TRANSMIT, Facets, Paths
 from raychan.run.explanation.rate_spread import meets
 from raychan.run.ledger_entry import NOTHING, Entry
 from raychan.run.mechanisms import slots_used
@@ -37,7 +37,7 @@ def intra_frame(paths: Paths, facets: Facets, radar: Radar, carried: NDArray[np.
     echo = np.asarray((~np.isin(paths.trajectories.kind, _PASSED)).any(axis=1))[paths.trajectory]
     strong = np.flatnonzero(size > _STRONG * (size[echo] if echo.any() else size).max())
     nearest = np.full(len(paths.trajectories.kind), np.inf)
-    bent = strong if carried is None else strong[~meets(paths, carried)[strong]]
+    bent = strong if carried is None else strong[~_followed(paths, carried)[strong]]
     np.minimum.at(nearest, paths.trajectory[bent], 0.5 * paths.length[bent])
     bend = _bend(paths, np.flatnonzero(np.isfinite(nearest)), nearest, facets, radar)
     phase = 2.0 * np.pi * radar.waveform.middle / C0 * bend * frame**2 / 4.0
@@ -48,6 +48,12 @@ def intra_frame(paths: Paths, facets: Facets, radar: Radar, carried: NDArray[np.
         "their mean over it; level relative to the echo that has it"
     )
     return Entry(float(db(max(phase, off, 1e-15) ** 2)), "bound", how)
+
+
+def _followed(paths: Paths, carried: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which paths (n,) are carried on: those that meet such bodies (b,), but not over an edge."""
+    over_edges = np.asarray((paths.trajectories.kind == DIFFRACT).any(axis=1))[paths.trajectory]
+    return meets(paths, carried) & ~over_edges
 
 
 def _bend(paths: Paths, taken: Ints, nearest: Floats, facets: Facets, radar: Radar) -> float:
