@@ -222,6 +222,8 @@ def _carry(  # type: ignore[no-untyped-def]
         spread = _part_lengths(
             vertices, normals, kind, body, points, i, at, used, 0, origin, still, here, end, ending, then
         )  # fmt: skip
+        # Within half a wavelength waves grow no more.
+        least = min(spread, (np.pi / k) ** (1 + (at < used)))
         wide = at < used and kind[i, at] == SCATTER
         split = False
         for t in range(txs.shape[0]):
@@ -229,7 +231,7 @@ def _carry(  # type: ignore[no-untyped-def]
                 vertices, normals, kind, body, points, i, at, used, t, origin, turn, place, txs, rxs, now
             )  # fmt: skip
             centre = length[i] + now[6] - then[6]
-            centres[0, t], centres[1, t] = centre, spread / over
+            centres[0, t], centres[1, t] = centre, spread / max(over, least)
             if not wide:
                 continue
             low, high = centre, centre

@@ -67,7 +67,7 @@ def traced_at(scene: Scene, model: Any) -> Instant:
     # The same scene stands alike at each run of it.
     then._derived = scene._derived.setdefault(("at", time), {})
     notes = _uneven(scene) if often else ()
-    if once and model.retrace != 1:
+    if once and model.retrace != 1 and wave.n_chirps > 2:
         notes = unfollowed(scene, smeared(scene) if carried is None else smeared(scene) & ~carried)
     return Instant(scene, then, time, often, notes, carried)
 
