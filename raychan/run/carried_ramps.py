@@ -105,7 +105,7 @@ class CarriedRamps:
             lengths, amplitudes = carried_between(
                 carried.routes, carried.strengths, partial(self.poses, key, pair), at, self.every, wave.middle
             )
-            carried.heard(amplitudes, key.scene.radar, (at - key.chirp) * wave.repetition)
+            carried.apply_gains(amplitudes, key.scene.radar, (at - key.chirp) * wave.repetition)
             # Phases are those of the carrier, of ramps at whose middle the parts are so long.
             amplitudes *= np.sqrt(self.radar.power) * np.exp(2j * np.pi * wave.swept / C0 * lengths)
             brought = self._ramps(lengths, amplitudes, chirps)

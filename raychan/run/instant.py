@@ -16,7 +16,7 @@ from raychan.run.turning import (
     middle_chirp,
     moves_as_one,
     needed,
-    smeared,
+    passing_phases,
     unfollowed,
 )
 from raychan.world.errors import SceneError
@@ -50,11 +50,11 @@ def traced_at(scene: Scene, model: Any) -> Instant:
     if often:
         check_often(scene, model.retrace)
     once = not often and model.mode != PREVIEW
-    carried = carried_over(scene, model.retrace) if once else None
-    if carried is not None and not carried.any():
-        carried = None
+    bent = passing_phases(scene) if once else np.zeros(len(scene.bodies))
+    carried = carried_over(scene, model.retrace, bent)
+    told = model.retrace != 1 and wave.n_chirps > 2
     # Routes are carried on from the start of a ramp.
-    time = wave.start_of(middle_chirp(wave.n_chirps)) if often or carried is not None else wave.centre
+    time = wave.start_of(middle_chirp(wave.n_chirps)) if often or carried.any() else wave.centre
     if time <= 0.0 or (moves_as_one(scene) and not scene.interferers):
         return Instant(scene, scene, 0.0, often)
     try:
@@ -63,13 +63,14 @@ def traced_at(scene: Scene, model: Any) -> Instant:
         if often:
             raise
         late = f"levels, rates and directions are those of the frame's start: by its middle {problem}"
-        return Instant(scene, scene, 0.0, often, (late,))
+        left = unfollowed(scene, bent, None, "levels of its start") if told else ()
+        return Instant(scene, scene, 0.0, often, (late, *left))
     # The same scene stands alike at each run of it.
     then._derived = scene._derived.setdefault(("at", time), {})
     notes = _uneven(scene) if often else ()
-    if once and model.retrace != 1 and wave.n_chirps > 2:
-        notes = unfollowed(scene, smeared(scene) if carried is None else smeared(scene) & ~carried)
-    return Instant(scene, then, time, often, notes, carried)
+    if told:
+        notes += unfollowed(scene, bent, carried)
+    return Instant(scene, then, time, often, notes, carried if carried.any() else None)
 
 
 def _uneven(scene: Scene) -> tuple[str, ...]:

@@ -25,7 +25,7 @@ from raychan.run.refinement.unreached import Remains
 from raychan.run.rules import asked, check_demand, check_rule, fine_rule
 from raychan.run.segments import Retraced, Traced
 from raychan.run.solver import Batch, solve_into
-from raychan.run.turning import carried_on, unfollowed
+from raychan.run.turning import carried_on, passing_phases, unfollowed
 from raychan.tracing.settings import PruneRule
 from raychan.tracing.stats import Stats
 from raychan.world.geometry import Geometry, geometry_of
@@ -89,7 +89,7 @@ def channel_of(scene: Scene, tolerance_db: float | None, max_bounces: int | None
         if channel is None:
             said.append(_WHOLE)
             if traced.carried is not None:
-                said += unfollowed(scene, traced.carried, "so many paths")
+                said += unfollowed(traced.start, passing_phases(traced.start), None, "so many paths")
     if channel is None:
         channel = _launched_twice(traced, geometry, points, model, clock)
     return replace(channel, warnings=(*said, *channel.warnings))

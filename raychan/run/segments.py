@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from raychan.channel.aims import Aims
+from raychan.channel.moving_directions import MovingDirections
 from raychan.channel.slow_time import strengths
 from raychan.columns import take
 from raychan.radar.antenna import IsotropicAntenna
@@ -84,31 +84,31 @@ class Traced:
 
 @dataclass(frozen=True)
 class CarriedRoutes:
-    """Routes that are carried on, with their `strengths` (n, 3), and where antennas see their waves, unless these are
-    alike in all directions."""
+    """Routes that are carried on, with their `strengths` (n, 3), and their directions at both ends unless antennas are
+    isotropic."""
 
     routes: Routes
     strengths: Complexes
-    aims: Aims | None
+    directions: MovingDirections | None
 
     @staticmethod
     def of(routes: Routes, facets: Facets, radar: Radar) -> CarriedRoutes:
         """Return routes at a radar."""
-        alike = all(isinstance(antenna, IsotropicAntenna) for antenna in (radar.tx, radar.rx))
-        aims = None if alike else Aims.of(routes, facets, radar)
-        return CarriedRoutes(routes, strengths(routes, facets, radar, radar.waveform.middle), aims)
+        isotropic = all(isinstance(antenna, IsotropicAntenna) for antenna in (radar.tx, radar.rx))
+        directions = None if isotropic else MovingDirections.of(routes, facets, radar)
+        return CarriedRoutes(routes, strengths(routes, facets, radar, radar.waveform.middle), directions)
 
     def __len__(self) -> int:
         return len(self.strengths)
 
     def __getitem__(self, rows: NDArray[Any]) -> CarriedRoutes:
-        aims = None if self.aims is None else self.aims[rows]
-        return CarriedRoutes(take(self.routes, rows), self.strengths[rows], aims)
+        directions = None if self.directions is None else self.directions[rows]
+        return CarriedRoutes(take(self.routes, rows), self.strengths[rows], directions)
 
-    def heard(self, amplitudes: Complexes, radar: Radar, late: Floats) -> None:
-        """Put on amplitudes (t, n, 3) what the radar's antennas change until instants (t,) [s] after the tracing."""
-        if self.aims is not None:
-            amplitudes *= self.aims.gains(radar, late)[:, :, None]
+    def apply_gains(self, amplitudes: Complexes, radar: Radar, late: Floats) -> None:
+        """Multiply amplitudes (t, n, 3) by what the gains of antennas change until instants (t,) [s] after tracing."""
+        if self.directions is not None:
+            amplitudes *= self.directions.gains(radar, late)[:, :, None]
 
 
 @dataclass(frozen=True)

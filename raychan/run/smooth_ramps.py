@@ -29,11 +29,11 @@ Complexes = NDArray[np.complex128]
 Ints = NDArray[np.int64]
 Samples = NDArray[np.complexfloating[Any, Any]]
 
-_DEGREES = 8, 16, 32  # of the polynomials, tried in order
-_TAIL = 1e-5  # of a part's amplitude, in its last two polynomials: then it is a sum of these
-_LEAST = 1e-7  # of the root of all parts' power: what counts of a polynomial
+_DEGREES = 8, 16, 32  # of the polynomials, tried in order; others not measured
+_TAIL = 1e-5  # of a part's amplitude, in its last two polynomials: then it is a sum of these; others not measured
+_LEAST = 1e-7  # of the root of all parts' power: what counts of a polynomial; with 1e-10 sums do not change at -92 dB
 _SUM = 1e-6  # error of the sums, of all amplitudes (that of `synthesize`)
-_GAIN = 2  # chirps for each polynomial from which on sums over polynomials take less time than sums over chirps
+_GAIN = 2  # chirps a polynomial from which on these sums are tried; with 4 scenes of 64 and 128 take as long
 
 
 class SmoothRamps(CarriedRamps):
@@ -76,7 +76,7 @@ class _Parts:
         at = middle + 0.5 * last * (1.0 - np.cos(np.pi * np.arange(degree + 1) / degree))
         poses = ramps.poses(key, pair, chirps[0] + at)
         lengths, amplitudes = extrapolated(carried.routes, carried.strengths, poses, wave.middle)
-        carried.heard(amplitudes, key.scene.radar, (chirps[0] + at - key.chirp) * wave.repetition)
+        carried.apply_gains(amplitudes, key.scene.radar, (chirps[0] + at - key.chirp) * wave.repetition)
         ramps.least, ramps.most = min(ramps.least, lengths.min() / C0), max(ramps.most, lengths.max() / C0)
         growth = (lengths[-1] - lengths[0]) / last
         length = lengths[0] - middle * growth
@@ -96,7 +96,7 @@ class _Parts:
         """The greatest factor (n, 3) of each part."""
         return np.asarray(np.abs(self.factors).max(axis=0))
 
-    @property
+    @cached_property
     def least(self) -> float:
         """The least factor that counts."""
         return _LEAST * float(np.linalg.norm(self.size))

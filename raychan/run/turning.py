@@ -50,28 +50,35 @@ def passing(scene: Scene) -> NDArray[np.bool_]:
     return np.array([_passes(scene, body) and not body.fluctuates for body in scene.bodies], bool)
 
 
-def smeared(scene: Scene) -> NDArray[np.bool_]:
-    """Return which bodies (b,) pass the radar so fast that constant rates do not hold over a whole frame."""
-    return np.array([_phase_error(scene, body, 0.5) > _SMEARED for body in scene.bodies], bool)
+def passing_phases(scene: Scene) -> NDArray[np.float64]:
+    """Return by how much phase (b,) [rad] constant rates are off half a frame from its middle, of bodies that pass."""
+    return np.array([_phase_error(scene, body, 0.5) for body in scene.bodies], float)
 
 
-def carried_over(scene: Scene, retrace: str | int) -> NDArray[np.bool_]:
-    """Return which bodies (b,) are carried on over a whole frame from its one tracing."""
-    passes = smeared(scene) & ~np.array([body.fluctuates for body in scene.bodies], bool)
-    return passes if retrace == "auto" and scene.radar.waveform.n_chirps > 2 and not _refused(scene) else passes & False
+def carried_over(scene: Scene, retrace: str | int, bent: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return which bodies (b,) are carried on over a whole frame from its one tracing.
+
+    Args: bent (b,) as of `passing_phases`."""
+    steady = np.array([not body.fluctuates for body in scene.bodies], bool)
+    follows = retrace == "auto" and scene.radar.waveform.n_chirps > 2 and not _refused(scene)
+    return (bent > _SMEARED) & steady & follows
 
 
-def unfollowed(scene: Scene, left: NDArray[np.bool_], why: str = "") -> tuple[str, ...]:
-    """Return a line if some bodies (b,) pass so fast that constant rates do not hold over a frame, but are not carried
-    on. Args: why they are not, unless what the scene has tells."""
-    passing_by = [body for body, one in zip(scene.bodies, left, strict=True) if one]
-    if not passing_by:
+def unfollowed(
+    scene: Scene, bent: NDArray[np.float64], carried: NDArray[np.bool_] | None, why: str = ""
+) -> tuple[str, ...]:
+    """Return a line if bodies pass so fast that constant rates do not hold over a frame, but are not carried on.
+
+    Args: bent (b,) as of `passing_phases`; carried, which bodies (b,) are; why the others are not, unless the scene
+    tells."""
+    left = (bent > _SMEARED) if carried is None else (bent > _SMEARED) & ~carried
+    if not left.any():
         return ()
-    phase = max(_phase_error(scene, body, 0.5) for body in passing_by)
+    names = ", ".join(body.name for body, one in zip(scene.bodies, left, strict=True) if one)
     reason = why or (*_refused(scene), "targets that fluctuate")[0]
     return (
-        f"{', '.join(body.name for body in passing_by)}: passing bends ranges by up to {phase:.2g} rad of phase within "
-        f"the frame, and with {reason} rates are constant: levels may be off by more than is stated",
+        f"{names}: passing bends ranges by up to {bent[left].max():.2g} rad of phase within the frame, and with "
+        f"{reason} rates are constant: levels may be off by more than is stated",
     )
 
 

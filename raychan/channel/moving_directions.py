@@ -1,4 +1,4 @@
-"""Where waves leave a radar and come back to it as what they meet moves on, and what its antennas give there."""
+"""Directions of departure and arrival as what waves meet moves on, and the gains of antennas there."""
 
 from __future__ import annotations
 
@@ -18,9 +18,8 @@ Complexes = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)
-class Aims:
-    """The sources of routes' waves as both ends see them, over the mirrors on the way: of the transmitter's by
-    reciprocity."""
+class MovingDirections:
+    """Where transmitter and receiver see each route's scatterer, over mirrors on the way, and how it moves there."""
 
     place: Floats
     """(n, 2, 3) [m] from transmitter and receiver at the time of tracing."""
@@ -28,7 +27,7 @@ class Aims:
     """(n, 2, 3) [m/s] relative to these."""
 
     @staticmethod
-    def of(routes: Routes, facets: Facets, radar: Any) -> Aims:
+    def of(routes: Routes, facets: Facets, radar: Any) -> MovingDirections:
         """Return those of routes at a radar."""
         n = len(routes.kind)
         ends = [np.broadcast_to(x, (n, 1, 3)) for x in (routes.tx, routes.rx)]
@@ -37,10 +36,10 @@ class Aims:
             np.concatenate([ends[0], routes.vertices, ends[1]], axis=1), routes.scatter, away, look, routes.length
         )
         place = np.stack([away * waves.tx_radius[:, None], look * waves.radius[:, None]], axis=1)
-        return Aims(place, source_velocities(routes, facets, radar.velocity, radar.rx_motion))
+        return MovingDirections(place, source_velocities(routes, facets, radar.velocity, radar.rx_motion))
 
-    def __getitem__(self, rows: NDArray[Any]) -> Aims:
-        return Aims(self.place[rows], self.velocity[rows])
+    def __getitem__(self, rows: NDArray[Any]) -> MovingDirections:
+        return MovingDirections(self.place[rows], self.velocity[rows])
 
     def gains(self, radar: Any, late: Floats) -> Complexes:
         """Return the factors (t, n) by which a radar's antennas change waves at instants (t,) [s] after the tracing."""
